@@ -1,0 +1,221 @@
+"""The checks of a recording, each a named note. Their bounds are in data/quality.toml.
+
+Checks of single signals run on the samples as sent, in the criteria's units; checks of the motion run on the filtered
+kinematics of the head's centre of gravity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from headimpact.kinematics import HeadKinematics
+from headimpact.published import QUALITY_LIMITS
+
+FloatArray = NDArray[np.float64]
+Severity = Literal["note", "warning"]
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, slots=True)
+class QualityNote:
+    """One finding about a recording: a code, how much it matters, and a sentence with numbers."""
+
+    code: str
+    severity: Severity
+    detail: str
+    signal: str | None = None
+    channel: str | None = None
+
+
+def words(signal: str) -> str:
+    """A signal's name as people write it."""
+    return signal.replace("_", " ")
+
+
+def check_signal(signal: str, samples: FloatArray, declared_range: float | None, planar: bool) -> Iterator[QualityNote]:
+    """Notes on one signal as sent, n x 3, in the criteria's unit."""
+    magnitude = np.abs(samples)
+    peaks = magnitude.max(axis=0)
+    yield from _extreme_values(signal, peaks)
+    if not planar:
+        yield from _constant_channels(signal, samples)
+    yield from _saturated(signal, magnitude, peaks, declared_range)
+    yield from _edge_glitches(signal, samples, peaks)
+
+
+def _extreme_values(signal: str, peaks: FloatArray) -> Iterator[QualityNote]:
+    bound = QUALITY_LIMITS[signal]["extreme"]
+    for axis, peak in zip(AXES, peaks.tolist(), strict=True):
+        if peak > bound:
+            yield QualityNote(
+                "extreme_value",
+                "warning",
+                f"The {words(signal)} reaches {peak:.4g} on {axis}; beyond {bound:g} it is rarely a head.",
+                signal,
+                axis,
+            )
+
+
+def _constant_channels(signal: str, samples: FloatArray) -> Iterator[QualityNote]:
+    constant = (samples == samples[0]).all(axis=0)
+    if constant.any():
+        for axis in np.flatnonzero(constant):
+            level = "zero" if samples[0, axis] == 0 else "one value"
+            yield QualityNote(
+                "constant_channel",
+                "warning",
+                f"The {words(signal)} is {level} on {AXES[axis]} for the whole record.",
+                signal,
+                AXES[axis],
+            )
+
+
+def _saturated(
+    signal: str, magnitude: FloatArray, peaks: FloatArray, declared_range: float | None
+) -> Iterator[QualityNote]:
+    """Runs of equal samples at the largest value or within 5 % of the declared range."""
+    limits = QUALITY_LIMITS["saturation"]
+    level = peaks
+    if declared_range is not None:
+        level = np.minimum(peaks, limits["range_fraction"] * declared_range)
+    repeated = (magnitude[1:] == magnitude[:-1]) & (magnitude[1:] >= level)
+    # a run of three equal samples is two equal pairs in a row
+    runs = repeated[1:] & repeated[:-1]
+    if not runs.any():
+        return
+    for axis in np.flatnonzero(runs.any(axis=0) & (peaks > 0)):
+        if (magnitude[:, axis] == peaks[axis]).all():
+            continue
+        count = int(runs[:, axis].sum()) + limits["run"] - 1
+        yield QualityNote(
+            "saturated",
+            "warning",
+            f"The {words(signal)} stays at one value for {count} samples at its maximum on {AXES[axis]}.",
+            signal,
+            AXES[axis],
+        )
+
+
+def _edge_glitches(signal: str, samples: FloatArray, peaks: FloatArray) -> Iterator[QualityNote]:
+    limits = QUALITY_LIMITS["edge"]
+    near = limits["steps"] + 1
+    if samples.shape[0] < 2 * near:
+        return
+    ends = np.stack((samples[: near + 1], samples[: -near - 2 : -1]))
+    steps = np.abs(ends[:, 1:] - ends[:, :-1])
+    far = (steps[:, 0] > limits["ratio"] * steps[:, 1:].max(axis=1)) & (steps[:, 0] > limits["share_of_peak"] * peaks)
+    if not far.any():
+        return
+    for end, axis in zip(*np.nonzero(far), strict=True):
+        which = ("first", "last")[end]
+        yield QualityNote(
+            "edge_glitch",
+            "warning",
+            f"The {which} sample of the {words(signal)} is far off its neighbours on {AXES[axis]}: a step of "
+            f"{steps[end, 0, axis]:.4g}, {limits['ratio']:g} times larger than those beside it.",
+            signal,
+            AXES[axis],
+        )
+
+
+def check_identical(first: tuple[str, FloatArray], second: tuple[str, FloatArray]) -> Iterator[QualityNote]:
+    """A channel that was sent twice under two names."""
+    (name_a, a), (name_b, b) = first, second
+    if a.shape != b.shape:
+        return
+    sums_a, sums_b = a.sum(axis=0), b.sum(axis=0)
+    for i, j in zip(*np.nonzero(sums_a[:, None] == sums_b), strict=True):
+        if np.array_equal(a[:, i], b[:, j]) and np.any(a[:, i] != a[0, i]):
+            yield QualityNote(
+                "identical_channels",
+                "warning",
+                f"The {words(name_a)} on {AXES[i]} and the {words(name_b)} on {AXES[j]} are the same numbers.",
+                name_a,
+                AXES[i],
+            )
+
+
+def check_rate(signal: str, sample_rate_hz: float) -> Iterator[QualityNote]:
+    """A rate that is allowed, but low for an impact."""
+    bound = QUALITY_LIMITS["record"]["low_rate_hz"]
+    # stamps read to the microsecond put a 1 kHz device a hair on either side of its rate
+    if sample_rate_hz < bound * (1 - 1e-3):
+        yield QualityNote(
+            "low_sample_rate",
+            "warning",
+            f"The {words(signal)} was sampled at {sample_rate_hz:.4g} Hz; peaks are under-read below {bound:g} Hz.",
+            signal,
+        )
+
+
+def check_angular_acceleration(supplied: FloatArray, derived: FloatArray) -> Iterator[QualityNote]:
+    """Supplied angular acceleration against the derivative of the angular velocity, on one time base."""
+    bound = QUALITY_LIMITS["consistency"]["minimum_correlation"]
+    a, b = supplied.ravel(), derived.ravel()
+    a, b = a - a.mean(), b - b.mean()
+    scale = float(np.sqrt((a @ a) * (b @ b)))
+    correlation = float(a @ b) / scale if scale > 0 else 0.0
+    if correlation < bound:
+        yield QualityNote(
+            "angular_acceleration_mismatch",
+            "warning",
+            "The supplied angular acceleration and the derivative of the angular velocity have a correlation of "
+            f"{correlation:.3f}, under {bound:g}.",
+            "angular_acceleration",
+        )
+
+
+def check_units(kinematics: HeadKinematics) -> Iterator[QualityNote]:
+    """Angular against linear peaks: catches m/s^2 sent as g and deg/s sent as rad/s, which no single bound can."""
+    if kinematics.linear_acceleration_g is None or kinematics.angular_acceleration is None:
+        return
+    limits = QUALITY_LIMITS["unit_check"]
+    pla = float(np.sqrt(kinematics.linear_acceleration_squared.max()))
+    paa = float(np.sqrt(kinematics.angular_acceleration_squared.max()))
+    if pla == 0 or paa == 0:
+        return
+    ratio = paa * limits["lever_arm_m"] / (pla * limits["gravity_m_s2"])
+    if not limits["lowest"] <= ratio <= limits["highest"]:
+        yield QualityNote(
+            "implausible_units",
+            "warning",
+            f"Peak angular over peak linear acceleration gives R = {ratio:.3g}, outside {limits['lowest']:g} to "
+            f"{limits['highest']:g}: one of the units is probably not what it says.",
+        )
+
+
+def check_truncation(
+    kinematics: HeadKinematics, brain_angle: FloatArray | None, pre_trigger_known: bool
+) -> Iterator[QualityNote]:
+    """Records that end too early (the brain model is slow) or whose peak is at an edge."""
+    reasons = list(_truncation_reasons(kinematics, brain_angle, pre_trigger_known))
+    if reasons:
+        yield QualityNote("record_truncated", "warning", " ".join(reasons))
+
+
+def _truncation_reasons(
+    kinematics: HeadKinematics, brain_angle: FloatArray | None, pre_trigger_known: bool
+) -> Iterator[str]:
+    limits = QUALITY_LIMITS["record"]
+    last = kinematics.samples - 1
+    length_ms = last / kinematics.sample_rate_hz * 1000.0
+    after_ms = length_ms + kinematics.start_time_ms if pre_trigger_known else length_ms
+    if after_ms < limits["post_trigger_ms"] - 1000.0 / kinematics.sample_rate_hz:
+        since = "trigger" if pre_trigger_known else "start"
+        yield f"The record ends {after_ms:.4g} ms after its {since}, before {limits['post_trigger_ms']:g} ms."
+    if kinematics.linear_acceleration_g is not None:
+        peak = int(kinematics.linear_acceleration_squared.argmax())
+        if peak in (0, last) and kinematics.linear_acceleration_squared[peak] > 0:
+            yield "The linear acceleration peaks at the record's edge."
+    if brain_angle is not None:
+        peaks = np.abs(brain_angle).argmax(axis=0)
+        late = peaks >= last - limits["late_peak_fraction"] * last
+        late &= np.abs(brain_angle).max(axis=0) > 0
+        if late.any():
+            axes = ", ".join(AXES[i] for i in np.flatnonzero(late))
+            yield f"The brain angle peaks in the record's last {limits['late_peak_fraction']:.0%} ({axes})."

@@ -1,0 +1,136 @@
+"""A recording as a device sent it: signals in their own units, rates and frames.
+
+Nothing here is converted, filtered or rotated: that is :mod:`headimpact.preparation`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from headimpact.errors import TraceError
+from headimpact.filtering import PAPER, LowPass
+
+FloatArray = NDArray[np.float64]
+SignalName = Literal["linear_acceleration", "angular_velocity", "angular_acceleration"]
+AxesName = Literal["anatomical", "sae_j211"]
+PlaneName = Literal["sagittal", "coronal", "axial"]
+
+AXES = ("x", "y", "z")
+SIGNALS: tuple[SignalName, ...] = ("linear_acceleration", "angular_velocity", "angular_acceleration")
+
+ROTATION_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One three-axis signal.
+
+    Parameters
+    ----------
+    values
+        Samples, n x 3, columns x, y, z, in `unit`.
+    unit
+        ``"g"`` or ``"m/s^2"``; ``"rad/s"`` or ``"deg/s"``; ``"rad/s^2"`` or ``"deg/s^2"``.
+    sample_rate_hz
+        Samples per second [Hz], where the signal is sampled uniformly.
+    time_s
+        One stamp per sample [s], where it is not known to be. Exactly one of the two is given.
+    declared_range
+        The sensor's full scale in `unit`, if its maker states one.
+    """
+
+    values: FloatArray
+    unit: str
+    sample_rate_hz: float | None = None
+    time_s: FloatArray | None = None
+    declared_range: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """How a device sits on the head.
+
+    Parameters
+    ----------
+    accelerometer_rotation, gyroscope_rotation
+        Rotation matrices (3 x 3) that take sensor axes to head axes.
+    offset_m
+        The accelerometer's position relative to the head's centre of gravity, in the head axes that the rotations
+        lead to [m].
+
+    Raises
+    ------
+    TraceError
+        ``improper-rotation``, where a matrix is not orthonormal with determinant +1 within 1e-3.
+    """
+
+    accelerometer_rotation: FloatArray
+    gyroscope_rotation: FloatArray
+    offset_m: FloatArray
+
+    def __post_init__(self) -> None:
+        for sensor, rotation in (
+            ("accelerometer", self.accelerometer_rotation),
+            ("gyroscope", self.gyroscope_rotation),
+        ):
+            require_proper_rotation(rotation, sensor)
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One head impact as recorded: what is needed to compute the motion of the head's centre of gravity.
+
+    Parameters
+    ----------
+    linear_acceleration, angular_velocity, angular_acceleration
+        The signals; at least one is given.
+    axes
+        The frame the signals are in: ``"anatomical"`` (x forward, y left, z up) or ``"sae_j211"`` (x forward, y right,
+        z down). With a mounting, the frame that its rotations lead to.
+    mounting
+        None where the signals already are those of the head's centre of gravity, in head axes.
+    constrained_plane
+        The plane the motion was constrained to: the motion outside it is zero (the paper's planar data).
+    low_pass
+        The zero-phase low-pass filters to apply.
+    pre_trigger_ms
+        Time from the record's first sample to the trigger [ms]; None where the trigger is not known.
+    """
+
+    linear_acceleration: Signal | None = None
+    angular_velocity: Signal | None = None
+    angular_acceleration: Signal | None = None
+    axes: AxesName = "anatomical"
+    mounting: Mounting | None = None
+    constrained_plane: PlaneName | None = None
+    low_pass: LowPass = PAPER
+    pre_trigger_ms: float | None = None
+
+    def signals(self) -> list[tuple[SignalName, Signal]]:
+        """The signals that are there, each with its name."""
+        present = (
+            ("linear_acceleration", self.linear_acceleration),
+            ("angular_velocity", self.angular_velocity),
+            ("angular_acceleration", self.angular_acceleration),
+        )
+        return [(name, signal) for name, signal in present if signal is not None]  # type: ignore[misc] # literals widen
+
+
+def require_proper_rotation(rotation: FloatArray, sensor: str) -> None:
+    """Refuse a matrix that is not a rotation: a mirrored axis map would swap left and right in silence."""
+    matrix = np.asarray(rotation, dtype=np.float64)
+    orthonormal = bool(np.all(np.abs(matrix @ matrix.T - np.eye(3)) <= ROTATION_TOLERANCE))
+    if not orthonormal:
+        raise TraceError(
+            "improper-rotation", f"The {sensor}'s rotation must be orthonormal within {ROTATION_TOLERANCE:g}."
+        )
+    if abs(float(np.linalg.det(matrix)) - 1.0) > ROTATION_TOLERANCE:
+        raise TraceError(
+            "improper-rotation",
+            f"The {sensor}'s rotation must have determinant +1 within {ROTATION_TOLERANCE:g}: "
+            "a determinant of -1 mirrors an axis, which no mounting does.",
+        )
