@@ -1,0 +1,150 @@
+"""A JSON body into a record."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+
+from headimpact.errors import TraceError
+from headimpact.filtering import NO_FILTER, PAPER, LowPass
+from headimpact.recording import AXES, Mounting, Recording, Signal, require_proper_rotation
+from headimpact.risk import OperatingPointRequest
+from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest import impact_rules
+from headimpact_service.ingest.impact_json import (
+    AthleteRef,
+    FilterBody,
+    ImpactBody,
+    Kinematics,
+    MountingBody,
+    ScoreBody,
+    SignalBody,
+)
+from headimpact_service.ingest.json_faults import parse, rules_problem
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.stamps import nominal_rate
+
+Body = TypeVar("Body", bound=ScoreBody)
+
+
+def read_impact(data: bytes) -> ImpactRecord:
+    """The body of an impact to be stored, validated in one pass; :class:`Problem` 400 or 422 otherwise."""
+    return to_record(parse(data, ImpactBody))
+
+
+def read_score(data: bytes) -> ImpactRecord:
+    """The body of an impact to be scored only."""
+    return to_record(parse(data, ScoreBody))
+
+
+def to_record(body: ScoreBody, *, time_zone: str | None = None, what: str = "body") -> ImpactRecord:
+    """A valid body as a record, once the rules between its fields hold."""
+    occurred_at, late = impact_rules.occurred_at(body, time_zone)
+    broken = impact_rules.faults(body) + late
+    if broken:
+        raise rules_problem(broken, what=what)
+    athlete: AthleteRef | None = getattr(body, "athlete", None)
+    kinematics = body.kinematics
+    return ImpactRecord(
+        recording=recording(kinematics),
+        external_id=body.external_id,
+        athlete_id=None if athlete is None else athlete.id,
+        athlete_external_id=None if athlete is None else athlete.external_id,
+        occurred_at=occurred_at,
+        device_serial=None if body.device is None else body.device.serial,
+        context={} if body.context is None else body.context.model_dump(exclude_none=True),
+        metadata={"format": "json"},
+        needs_device_mounting=kinematics.location == "sensor" and kinematics.mounting is None,
+        operating_points=_operating_points(body),
+        include=tuple(body.include or ()),
+        extra_criteria=tuple(body.extra_criteria or ()),
+    )
+
+
+def recording(kinematics: Kinematics) -> Recording:
+    """The kinematics of a body as the science takes them."""
+    uniform = _share_their_start(kinematics)
+    return Recording(
+        linear_acceleration=_signal(kinematics.linear_acceleration, uniform=uniform),
+        angular_velocity=_signal(kinematics.angular_velocity, uniform=uniform),
+        angular_acceleration=_signal(kinematics.angular_acceleration, uniform=uniform),
+        axes=kinematics.axes,
+        mounting=None if kinematics.mounting is None else mounting(kinematics.mounting),
+        constrained_plane=kinematics.constrained_plane,
+        low_pass=low_pass(kinematics.filter),
+        pre_trigger_ms=kinematics.pre_trigger_ms,
+    )
+
+
+def low_pass(choice: str | FilterBody) -> LowPass:
+    """The filters that a request names."""
+    if isinstance(choice, FilterBody):
+        return LowPass(linear_acceleration=choice.linear_acceleration, angular_velocity=choice.angular_velocity)
+    return PAPER if choice == "paper" else NO_FILTER
+
+
+def mounting(body: MountingBody) -> Mounting:
+    """A mounting of a request; 422 `improper-rotation` for a matrix that is no rotation."""
+    gyroscope = body.gyroscope or body.accelerometer
+    _require_rotation(body.accelerometer.rotation, "accelerometer")
+    _require_rotation(gyroscope.rotation, "gyroscope" if body.gyroscope else "accelerometer")
+    return Mounting(
+        accelerometer_rotation=np.array(body.accelerometer.rotation),
+        gyroscope_rotation=np.array(gyroscope.rotation),
+        offset_m=np.array(body.accelerometer.offset_mm) / 1000.0,
+    )
+
+
+def _require_rotation(rotation: list[list[float]], sensor: str) -> None:
+    try:
+        require_proper_rotation(np.array(rotation), sensor)
+    except TraceError as error:
+        fault = PayloadError(detail=str(error), code=error.code, pointer=f"/kinematics/mounting/{sensor}/rotation")
+        raise Problem("improper-rotation", str(error), errors=[fault]) from None
+
+
+def _share_their_start(kinematics: Kinematics) -> bool:
+    """Whether every signal starts at one instant: only then may stamps be replaced by the rate that they say."""
+    bodies = (kinematics.linear_acceleration, kinematics.angular_velocity, kinematics.angular_acceleration)
+    starts = {None if body.time_ms is None else body.time_ms[0] for body in bodies if body is not None}
+    return len(starts) == 1
+
+
+def _signal(body: Any, *, uniform: bool) -> Signal | None:  # noqa: ANN401 - one of three bodies, each with its unit
+    if body is None:
+        return None
+    values = _samples(body)
+    if body.time_ms is None:
+        return Signal(values=values, unit=body.unit, sample_rate_hz=body.sample_rate_hz)
+    stamps_s = np.array(body.time_ms) / 1000.0
+    rate = nominal_rate(stamps_s) if uniform else None
+    if rate is not None:
+        return Signal(values=values, unit=body.unit, sample_rate_hz=rate)
+    return Signal(values=values, unit=body.unit, time_s=stamps_s)
+
+
+def _samples(body: SignalBody) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """The components side by side; one that a constrained plane leaves out is zero."""
+    if body.x is not None and body.y is not None and body.z is not None:
+        return np.ascontiguousarray(np.array((body.x, body.y, body.z), dtype=np.float64).T)
+    given = {axis: samples for axis in AXES if (samples := getattr(body, axis)) is not None}
+    values = np.zeros((len(next(iter(given.values()))), 3))
+    for column, axis in enumerate(AXES):
+        if axis in given:
+            values[:, column] = given[axis]
+    return values
+
+
+def _operating_points(body: ScoreBody) -> tuple[OperatingPointRequest, ...] | None:
+    if body.operating_points is None:
+        return None
+    return tuple(
+        OperatingPointRequest(
+            criterion=point.criterion,
+            sensitivity=point.sensitivity,
+            specificity=point.specificity,
+            threshold=point.threshold,
+        )
+        for point in body.operating_points
+    )

@@ -1,0 +1,111 @@
+"""Failed validation as payload errors: where, which rule with its bound, and never the offending value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails, from_json
+
+from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
+
+Body = TypeVar("Body", bound=BaseModel)
+
+MAX_POINTER = 200
+"""Characters of a pointer that is given back: keys in it come from the caller."""
+
+# pydantic's error type -> (our code, the sentence; {…} are bounds that pydantic gives with the error).
+_RULES: Mapping[str, tuple[str, str]] = {
+    "missing": ("missing", "This field is required."),
+    "extra_forbidden": ("unknown-field", "This field is not known here."),
+    "finite_number": ("not-finite", "A number must be finite: NaN and Infinity are refused."),
+    "float_type": ("wrong-type", "A number is needed."),
+    "int_type": ("wrong-type", "A whole number is needed."),
+    "string_type": ("wrong-type", "Text is needed."),
+    "bool_type": ("wrong-type", "true or false is needed."),
+    "list_type": ("wrong-type", "A list is needed."),
+    "dict_type": ("wrong-type", "An object is needed."),
+    "model_type": ("wrong-type", "An object is needed."),
+    "model_attributes_type": ("wrong-type", "An object is needed."),
+    "too_short": ("too-short", "At least {min_length} entries are needed."),
+    "too_long": ("too-long", "At most {max_length} entries are taken."),
+    "string_too_short": ("too-short", "At least {min_length} characters are needed."),
+    "string_too_long": ("too-long", "At most {max_length} characters are taken."),
+    "string_pattern_mismatch": ("control-character", "Control characters are refused."),
+    "literal_error": ("not-allowed", "One of these is needed: {expected}."),
+    "greater_than": ("out-of-range", "A value above {gt:g} is needed."),
+    "greater_than_equal": ("out-of-range", "A value of at least {ge:g} is needed."),
+    "less_than": ("out-of-range", "A value below {lt:g} is needed."),
+    "less_than_equal": ("out-of-range", "A value of at most {le:g} is needed."),
+    "cut_off_form": ("wrong-type", "A filter is a cut-off in Hz, CFC60, CFC180, CFC600, CFC1000 or null."),
+    "filter_form": ("wrong-type", 'A filter is "paper", "none" or an object with a cut-off for each signal.'),
+}
+_SAMPLES = frozenset({"x", "y", "z", "time_ms"})
+
+
+def parse(data: bytes, model: type[Body], *, what: str = "body") -> Body:
+    """`data` as `model`: 400 unless it is JSON, 422 with every broken rule (up to 20) unless it fits."""
+    try:
+        return model.model_validate_json(data)
+    except ValidationError as error:
+        raise validation_problem(error, data, what=what) from None
+
+
+def validation_problem(error: ValidationError, data: bytes, *, what: str = "body") -> Problem:
+    """The problem that a failed validation of the JSON text `data` is."""
+    faults = error.errors(include_url=False, include_input=False)
+    if faults[0]["type"] == "json_invalid":
+        return Problem("malformed-request", f"The {what} is not JSON: {_reason(faults[0])}.")
+    return rules_problem(payload_errors(faults, from_json(data)), what=what, count=len(faults))
+
+
+def rules_problem(errors: Sequence[PayloadError], *, what: str = "body", count: int | None = None) -> Problem:
+    """The 422 for rules that a readable body breaks."""
+    number = count or len(errors)
+    broken = "a rule" if number == 1 else f"{number} rules"
+    return Problem("invalid-payload", f"The {what} breaks {broken}.", errors=errors)
+
+
+def payload_errors(faults: Sequence[ErrorDetails], document: Any) -> list[PayloadError]:  # noqa: ANN401 - any JSON
+    """The first 20 faults, each at the pointer where `document` has it."""
+    return [_payload_error(fault, document) for fault in faults[:MAX_ERRORS]]
+
+
+def pointer(steps: Sequence[object]) -> str:
+    """A JSON pointer (RFC 6901) of bounded length."""
+    escaped = (str(step).replace("~", "~0").replace("/", "~1") for step in steps)
+    return "".join(f"/{step}" for step in escaped)[:MAX_POINTER]
+
+
+def _payload_error(fault: ErrorDetails, document: Any) -> PayloadError:  # noqa: ANN401 - any JSON
+    steps = _steps(fault, document)
+    code, sentence = _RULES.get(fault["type"], ("invalid", "The value does not fit this field."))
+    detail = sentence.format_map(fault.get("ctx", {}))
+    if code in {"too-short", "too-long"} and steps and steps[-1] in _SAMPLES:
+        detail = detail.replace("entries", "samples")
+    return PayloadError(detail=detail, code=code, pointer=pointer(steps))
+
+
+def _steps(fault: ErrorDetails, document: Any) -> list[object]:  # noqa: ANN401 - any JSON
+    """The fault's place in the document: pydantic's location also names the branch of a union, which is no place."""
+    steps: list[object] = []
+    node, last = document, len(fault["loc"]) - 1
+    for index, step in enumerate(fault["loc"]):
+        if _holds(node, step):
+            node = node[step]
+        elif not (fault["type"] == "missing" and index == last):
+            continue
+        steps.append(step)
+    return steps
+
+
+def _holds(node: Any, step: object) -> bool:  # noqa: ANN401 - any JSON
+    if isinstance(node, dict):
+        return step in node
+    return isinstance(node, list) and isinstance(step, int) and step < len(node)
+
+
+def _reason(fault: ErrorDetails) -> str:
+    """The parser's words: they say what and where, and hold nothing of the text itself."""
+    return str(fault.get("ctx", {}).get("error", "reading stopped"))
