@@ -1,0 +1,58 @@
+"""What deletion leaves of an impact: a row that says that something was here, and when it went."""
+
+from __future__ import annotations
+
+from sqlalchemy import Connection, bindparam, delete, select, update
+
+from headimpact_service.store.clock import next_change
+from headimpact_service.store.columns import MICROSECOND
+from headimpact_service.store.tables import impact_revisions, impacts, scores, traces
+
+_NOTHING = {
+    column.name: None
+    for column in impacts.c
+    if column.name not in {"id", "data_set_id", "external_id", "external_id_digest", "athlete_id"} and column.nullable
+}
+_ENTOMB = update(impacts).where(impacts.c.id == bindparam("impact_id"))
+_CONTENTS = [
+    delete(table).where(table.c.impact_id == bindparam("impact")) for table in (traces, scores, impact_revisions)
+]
+_REVISION = [
+    delete(table).where(table.c.impact_id == bindparam("impact"), table.c.revision == bindparam("number_of_revision"))
+    for table in (traces, scores, impact_revisions)
+]
+
+
+def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes], *, external_ids: bool) -> None:
+    """Delete the traces, scores and revisions of impacts and all they say; with `external_ids` their names too.
+
+    The athlete's id stays, so that whoever follows one athlete's list sees the tombstone, and so does the digest of
+    the external id, so that a redelivery does not bring the impact back.
+    """
+    if not impact_ids:
+        return
+    for statement in _CONTENTS:
+        conn.execute(statement, [{"impact": impact_id} for impact_id in impact_ids])
+    first = next_change(conn, impacts, data_set_id)
+    nothing = _NOTHING | ({"external_id": None} if external_ids else {})
+    tombs = []
+    for number, impact_id in enumerate(impact_ids):
+        now = first + number * MICROSECOND
+        tombs.append(nothing | {"impact_id": impact_id, "updated_at": now, "deleted_at": now})
+    conn.execute(_ENTOMB.values(revision=impacts.c.revision + 1), tombs)
+
+
+def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> None:
+    """Erase an athlete's impacts, and their revisions of impacts that were corrected to another athlete."""
+    mine = select(impacts.c.id).where(impacts.c.athlete_id == athlete_id)
+    known = conn.execute(mine.where(impacts.c.deleted_at.is_(None))).scalars().all()
+    erase_impacts(conn, data_set_id, list(known), external_ids=True)
+    # Those deleted one by one before kept their external ids.
+    conn.execute(update(impacts).where(impacts.c.athlete_id == athlete_id).values(external_id=None))
+    revisions = impact_revisions.c
+    moved = conn.execute(
+        select(revisions.impact_id, revisions.revision).where(revisions.athlete_id == athlete_id)
+    ).all()
+    if moved:
+        for statement in _REVISION:
+            conn.execute(statement, [{"impact": impact, "number_of_revision": number} for impact, number in moved])

@@ -1,0 +1,278 @@
+"""Impacts: stored once, corrected with their revisions kept, deleted with only a tombstone left.
+
+Every function that writes runs inside the writer's transaction, so what it reads cannot change before it commits.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, NamedTuple
+
+from sqlalchemy import BindParameter, Connection, bindparam, insert, select, update
+
+from headimpact_service.errors import PayloadError, Problem, not_found
+from headimpact_service.store import athletes as athlete_store
+from headimpact_service.store import devices as device_store
+from headimpact_service.store import erasure, ids
+from headimpact_service.store.clock import last_change, later_than, next_change
+from headimpact_service.store.impact_lists import (
+    ImpactFilters,
+    Trace,
+    find_same_content,
+    get,
+    get_any,
+    page,
+    revisions,
+    trace,
+)
+from headimpact_service.store.impact_rows import Impact, NewImpact, Outcome, Revision, external_id_digest
+from headimpact_service.store.revision import require_revision
+from headimpact_service.store.score_rows import row_of, stored
+from headimpact_service.store.scores import next_number
+from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts, scores, traces
+
+__all__ = [
+    "Impact",
+    "ImpactFilters",
+    "NewImpact",
+    "Outcome",
+    "Revision",
+    "Trace",
+    "add",
+    "correct",
+    "delete",
+    "find_same_content",
+    "get",
+    "get_any",
+    "page",
+    "revisions",
+    "trace",
+]
+
+_DATA_SET: BindParameter[bytes] = bindparam("data_set_id")
+
+
+class _Known(NamedTuple):
+    """What is stored already that a new impact touches: one query for all of it."""
+
+    last_change: datetime | None
+    athlete_by_name: bytes | None
+    athlete_by_id: bytes | None
+    athlete_external_id: str | None
+    device: bytes | None
+    same_external_id: bytes | None
+    same_content: bytes | None
+
+
+_ATHLETE_BY_ID = (
+    athletes.c.id == bindparam("athlete_id"),
+    athletes.c.data_set_id == _DATA_SET,
+    athletes.c.deleted_at.is_(None),
+)
+_KNOWN = select(
+    last_change(impacts),
+    select(athletes.c.id)
+    .where(athletes.c.data_set_id == _DATA_SET, athletes.c.external_id == bindparam("athlete_external_id"))
+    .scalar_subquery(),
+    select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),
+    select(athletes.c.external_id).where(*_ATHLETE_BY_ID).scalar_subquery(),
+    select(devices.c.id)
+    .where(devices.c.data_set_id == _DATA_SET, devices.c.serial == bindparam("serial"))
+    .scalar_subquery(),
+    select(impacts.c.id)
+    .where(impacts.c.data_set_id == _DATA_SET, impacts.c.external_id_digest == bindparam("external_id_digest"))
+    .scalar_subquery(),
+    select(impacts.c.id)
+    .where(impacts.c.data_set_id == _DATA_SET, impacts.c.input_digest == bindparam("input_digest"))
+    .order_by(impacts.c.id)
+    .limit(1)
+    .scalar_subquery(),
+)
+_SAME_EVENT = select(impacts.c.id).where(
+    impacts.c.data_set_id == _DATA_SET,
+    impacts.c.input_digest == bindparam("input_digest"),
+    impacts.c.athlete_id.is_not_distinct_from(bindparam("athlete_id")),
+    impacts.c.occurred_at.is_not_distinct_from(bindparam("occurred_at")),
+)
+_INSERT_IMPACT = insert(impacts)
+_INSERT_REVISION = insert(impact_revisions)
+_INSERT_TRACE = insert(traces)
+_INSERT_SCORE = insert(scores)
+
+
+def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_unchanged: bool = False) -> Outcome:
+    """Store an impact with its trace and score, or find that it is there.
+
+    A redelivery of an external id with the content of any kept revision is `unchanged`; with other content it is an
+    `external-id-conflict` problem, and `impact-deleted` after a deletion. An athlete id that is none of the data set's
+    is an `invalid-payload` problem. With `same_event_is_unchanged` (imports), an impact of the same athlete, instant
+    and input is `unchanged` too, whatever it is called.
+    """
+    known = _look_up(conn, data_set_id, new)
+    if same_event_is_unchanged and known.same_content is not None:
+        same = _same_event(conn, data_set_id, new, known)
+        if same is not None:
+            return Outcome("unchanged", same)
+    if known.same_external_id is not None:
+        return _redelivery(conn, data_set_id, new, known.same_external_id)
+    return Outcome("created", _insert(conn, data_set_id, new, known))
+
+
+def _look_up(conn: Connection, data_set_id: bytes, new: NewImpact) -> _Known:
+    parameters = {
+        "data_set_id": data_set_id,
+        "athlete_id": new.athlete_id,
+        "athlete_external_id": new.athlete_external_id,
+        "serial": new.device_serial,
+        "external_id_digest": external_id_digest(data_set_id, new.external_id),
+        "input_digest": new.input_digest,
+    }
+    known = _Known(*conn.execute(_KNOWN, parameters).one())
+    if new.athlete_id is not None and known.athlete_by_id is None:
+        detail = "There is no athlete with this id."
+        raise Problem(
+            "invalid-payload", detail, errors=[PayloadError(detail, "unknown-athlete", pointer="/athlete/id")]
+        )
+    return known
+
+
+def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact | None:
+    """The stored impact of the same athlete, instant and input."""
+    athlete_id = known.athlete_by_id or known.athlete_by_name
+    if athlete_id is None and new.athlete_external_id is not None:
+        return None  # an athlete never seen before has no impacts
+    parameters = {
+        "data_set_id": data_set_id,
+        "input_digest": new.input_digest,
+        "athlete_id": athlete_id,
+        "occurred_at": new.occurred_at,
+    }
+    found = conn.execute(_SAME_EVENT.limit(1), parameters).scalar()
+    return None if found is None else get(conn, data_set_id, found)
+
+
+def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, impact_id: bytes) -> Outcome:
+    """The stored impact of the same external id, if the content is that of one of its revisions."""
+    stored_impact = get(conn, data_set_id, impact_id)
+    if stored_impact is None:
+        raise Problem("impact-deleted", "The impact with this external_id was deleted.")
+    if any(kept.content_digest == new.content_digest for kept in revisions(conn, data_set_id, impact_id)):
+        return Outcome("unchanged", stored_impact)
+    raise Problem("external-id-conflict", "An impact with this external_id exists with other content.")
+
+
+def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact:
+    """Four rows: the impact, its first revision, its trace, its score."""
+    now = later_than(known.last_change)
+    members = _members(conn, data_set_id, new, known) | {
+        "id": ids.new(),
+        "external_id": new.external_id,
+        "duplicate_of": known.same_content,
+        "revision": 1,
+        "created_at": now,
+        "updated_at": now,
+        "deleted_at": None,
+    }
+    digest = external_id_digest(data_set_id, new.external_id)
+    row = members | {"data_set_id": data_set_id, "external_id_digest": digest, "score_number": 1}
+    conn.execute(_INSERT_IMPACT, row)
+    _insert_revision(conn, new, row, now)
+    return Impact(
+        **members,
+        athlete_external_id=new.athlete_external_id if new.athlete_id is None else known.athlete_external_id,
+        device_serial=new.device_serial,
+        document=new.document,
+        score=stored(new.score, row["id"], 1, 1, now),
+    )
+
+
+def _members(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> dict[str, Any]:
+    """The columns that a correction replaces; athlete and device are made if they are new."""
+    athlete_id = known.athlete_by_id or known.athlete_by_name
+    if athlete_id is None and new.athlete_external_id is not None:
+        athlete_id = athlete_store.ensure(conn, data_set_id, new.athlete_external_id)
+    device_id = known.device
+    if device_id is None and new.device_serial is not None:
+        device_id = device_store.ensure(conn, data_set_id, new.device_serial)
+    return {
+        "athlete_id": athlete_id,
+        "device_id": device_id,
+        "occurred_at": new.occurred_at,
+        "session_id": new.session_id,
+        "activity": new.activity,
+        "sport": new.sport,
+        "position": new.position,
+        "context": new.context,
+        "input_digest": new.input_digest,
+    }
+
+
+def _insert_revision(conn: Connection, new: NewImpact, row: dict[str, Any], now: datetime) -> None:
+    """The revision that an impact's row names, with its trace and its score."""
+    impact_id, revision = row["id"], row["revision"]
+    kept = {
+        "impact_id": impact_id,
+        "revision": revision,
+        "athlete_id": row["athlete_id"],
+        "content_digest": new.content_digest,
+        "input_digest": new.input_digest,
+        "document": new.document,
+        "key_id": new.key_id,
+        "created_at": now,
+    }
+    conn.execute(_INSERT_REVISION, kept)
+    conn.execute(_INSERT_TRACE, {"impact_id": impact_id, "revision": revision, "signals": new.trace})
+    conn.execute(_INSERT_SCORE, row_of(new.score, impact_id, row["score_number"], revision, now))
+
+
+def correct(
+    conn: Connection, data_set_id: bytes, impact_id: bytes, new: NewImpact, *, if_match: int | None = None
+) -> Outcome:
+    """Replace an impact's content; the revision before is kept with its trace and score.
+
+    The content that it has already is `unchanged`, also when `if_match` is the revision before: a correction that is
+    sent twice was done once.
+    """
+    present = _require(conn, data_set_id, impact_id)
+    kept = revisions(conn, data_set_id, impact_id)
+    if kept[-1].content_digest == new.content_digest:
+        return Outcome("unchanged", present)
+    require_revision(present.revision, if_match)
+    known = _look_up(conn, data_set_id, new)
+    row = _members(conn, data_set_id, new, known) | _name(data_set_id, present, new, known)
+    now = next_change(conn, impacts, data_set_id)
+    row |= {
+        "id": impact_id,
+        "revision": present.revision + 1,
+        "score_number": next_number(conn, impact_id),
+        "updated_at": now,
+    }
+    conn.execute(update(impacts).where(impacts.c.id == impact_id), row)
+    _insert_revision(conn, new, row, now)
+    return Outcome("corrected", _require(conn, data_set_id, impact_id))
+
+
+def _name(data_set_id: bytes, present: Impact, new: NewImpact, known: _Known) -> dict[str, Any]:
+    """The external id after a correction: kept, or given now to an impact that had none."""
+    if new.external_id is None or new.external_id == present.external_id:
+        return {}
+    if present.external_id is not None:
+        raise Problem("conflict", "The external_id of an impact cannot be changed.")
+    if known.same_external_id is not None:
+        raise Problem("external-id-conflict", "Another impact has, or had, this external_id.")
+    return {"external_id": new.external_id, "external_id_digest": external_id_digest(data_set_id, new.external_id)}
+
+
+def delete(conn: Connection, data_set_id: bytes, impact_id: bytes, *, if_match: int | None = None) -> Impact:
+    """Delete an impact's content and keep its tombstone, with its external id, which stays taken."""
+    present = _require(conn, data_set_id, impact_id)
+    require_revision(present.revision, if_match)
+    erasure.erase_impacts(conn, data_set_id, [impact_id], external_ids=False)
+    return get_any(conn, data_set_id, impact_id) or present
+
+
+def _require(conn: Connection, data_set_id: bytes, impact_id: bytes) -> Impact:
+    found = get(conn, data_set_id, impact_id)
+    if found is None:
+        raise not_found("impact")
+    return found

@@ -1,0 +1,74 @@
+"""Migrations at start: the whole way in one transaction that excludes every other process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from alembic.util import CommandError
+from sqlalchemy import Connection, Engine, text
+
+import headimpact_service
+
+
+class MigrationError(RuntimeError):
+    """The database cannot be brought to this version's schema."""
+
+
+def migrations_folder() -> Path:
+    """Where the migrations are: inside the installed package, or at the top of the source tree."""
+    package = Path(headimpact_service.__file__).parent
+    for folder in (package / "migrations", package.parents[1] / "migrations"):
+        if (folder / "env.py").is_file():
+            return folder
+    raise MigrationError("The migrations were not installed with the service.")
+
+
+def upgrade(engine: Engine, revision: str = "head") -> None:
+    """Bring a database to a revision; a second process that starts meanwhile waits and then finds it done.
+
+    `engine` must begin its transactions with the write lock and hold foreign keys off: with them on, the rebuild of
+    a table would delete its children's rows in silence.
+    """
+    config = Config()
+    config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
+    config.set_main_option("path_separator", "os")
+    with engine.begin() as conn:
+        _lock(conn)
+        _refuse_newer(conn, ScriptDirectory.from_config(config))
+        config.attributes["connection"] = conn
+        command.upgrade(config, revision)
+        _check_foreign_keys(conn)
+
+
+def current_revision(conn: Connection) -> str | None:
+    """The revision of a database, None if it has no tables of ours."""
+    return MigrationContext.configure(conn).get_current_revision()
+
+
+def _lock(conn: Connection) -> None:
+    """Exclude other processes; on SQLite the transaction itself already does."""
+    if conn.dialect.name == "postgresql":
+        conn.execute(text("SELECT pg_advisory_xact_lock(4711049)"))
+
+
+def _refuse_newer(conn: Connection, scripts: ScriptDirectory) -> None:
+    revision = current_revision(conn)
+    if revision is None:
+        return
+    try:
+        scripts.get_revision(revision)
+    except CommandError as error:
+        raise MigrationError(
+            f"The database is at revision {revision}, which this version of headimpact does not know: "
+            "it was written by a newer one. Install that version, or restore a backup from before the upgrade."
+        ) from error
+
+
+def _check_foreign_keys(conn: Connection) -> None:
+    """Roll a migration back that left a row without its parent."""
+    if conn.dialect.name == "sqlite" and conn.exec_driver_sql("PRAGMA foreign_key_check").first() is not None:
+        raise MigrationError("The migration would leave rows whose parent is missing; nothing was changed.")

@@ -1,0 +1,211 @@
+"""The tables: every resource hangs on a data set, every data set (live or test) on an organisation."""
+
+from __future__ import annotations
+
+from sqlalchemy import (
+    Column,
+    Double,
+    ForeignKey,
+    ForeignKeyConstraint,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+
+from headimpact_service.store.columns import Digest, Document, Identifier, Instant
+
+NAMING = {
+    "pk": "pk_%(table_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_N_name)s",
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+}
+
+CRITERION_COMPONENTS: dict[str, int] = {
+    "peak_angular_acceleration": 3,
+    "delta_angular_velocity": 3,
+    "bric": 1,
+    "ric": 1,
+    "peak_linear_acceleration": 3,
+    "hic15": 1,
+    "hic36": 1,
+    "si": 1,
+    "hip": 1,
+    "hip3d": 3,
+    "gambit": 1,
+    "vtcp": 1,
+    "bam": 3,
+}
+"""The criteria that have columns. A migration froze them: a new criterion is a new migration."""
+
+CRITERION_COLUMNS: dict[str, tuple[str, ...]] = {
+    key: (key,) if components == 1 else (f"{key}_x", f"{key}_y", f"{key}_z")
+    for key, components in CRITERION_COMPONENTS.items()
+}
+VALUE_COLUMNS: tuple[str, ...] = tuple(column for columns in CRITERION_COLUMNS.values() for column in columns)
+PROBABILITY_COLUMNS: tuple[str, ...] = tuple(f"{key}_probability" for key in CRITERION_COMPONENTS)
+PEAK_COLUMNS: tuple[str, ...] = (
+    "brain_angle_resultant",
+    "resultant_linear_acceleration_g",
+    "resultant_angular_velocity_rad_s",
+    "resultant_angular_acceleration_rad_s2",
+)
+
+metadata = MetaData(naming_convention=NAMING)
+
+organisations = Table(
+    "organisations",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("name", String(200), nullable=False, unique=True),
+    Column("incidence", Double),
+    Column("operating_points", Document, nullable=False),
+    Column("settings_revision", Integer, nullable=False),
+    Column("created_at", Instant, nullable=False),
+)
+
+data_sets = Table(
+    "data_sets",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("organisation_id", ForeignKey("organisations.id"), nullable=False),
+    Column("mode", String(8), nullable=False),
+    UniqueConstraint("organisation_id", "mode"),
+)
+
+api_keys = Table(
+    "api_keys",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False, index=True),
+    Column("name", String(200), nullable=False),
+    Column("sha256", Digest, nullable=False, unique=True),
+    Column("shown", String(32), nullable=False),
+    Column("scopes", Document, nullable=False),
+    Column("created_at", Instant, nullable=False),
+    Column("expires_at", Instant),
+    Column("revoked_at", Instant),
+)
+
+athletes = Table(
+    "athletes",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False),
+    Column("external_id", Text),
+    Column("tags", Document, nullable=False),
+    Column("sport", Text),
+    Column("level", Text),
+    Column("position", Text),
+    Column("sex", Text),
+    Column("birth_year", Integer),
+    Column("time_zone", Text),
+    Column("consent", Text),
+    Column("revision", Integer, nullable=False),
+    Column("created_at", Instant, nullable=False),
+    Column("updated_at", Instant, nullable=False),
+    Column("deleted_at", Instant),
+    UniqueConstraint("data_set_id", "external_id"),
+    Index(None, "data_set_id", "updated_at", "id"),
+    Index(None, "data_set_id", "id"),
+)
+
+devices = Table(
+    "devices",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False),
+    Column("serial", Text, nullable=False),
+    Column("maker", Text),
+    Column("model", Text),
+    Column("firmware", Text),
+    Column("linear_acceleration_range_g", Double),
+    Column("angular_velocity_range_rad_s", Double),
+    Column("trigger_threshold_g", Double),
+    Column("mounting", Document),
+    Column("metadata", Document, nullable=False),
+    Column("revision", Integer, nullable=False),
+    Column("created_at", Instant, nullable=False),
+    Column("updated_at", Instant, nullable=False),
+    UniqueConstraint("data_set_id", "serial"),
+    Index(None, "data_set_id", "updated_at", "id"),
+    Index(None, "data_set_id", "id"),
+)
+
+impacts = Table(
+    "impacts",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False),
+    Column("external_id", Text),
+    # What is unique is a digest of the external id: it outlives an erasure, so a redelivery cannot undo one.
+    Column("external_id_digest", LargeBinary(16)),
+    Column("athlete_id", ForeignKey("athletes.id")),
+    Column("device_id", ForeignKey("devices.id")),
+    Column("occurred_at", Instant),
+    Column("session_id", Text),
+    Column("activity", Text),
+    Column("sport", Text),
+    Column("position", Text),
+    Column("context", Document),
+    Column("input_digest", Digest),
+    Column("duplicate_of", Identifier),
+    Column("revision", Integer, nullable=False),
+    # The number of the score that stands for the impact: a column here is one index less than a flag there.
+    Column("score_number", Integer, nullable=False),
+    Column("created_at", Instant, nullable=False),
+    Column("updated_at", Instant, nullable=False),
+    Column("deleted_at", Instant),
+    UniqueConstraint("data_set_id", "external_id_digest"),
+    Index(None, "data_set_id", "updated_at", "id"),
+    Index(None, "data_set_id", "id"),
+    Index(None, "data_set_id", "input_digest"),
+    Index(None, "athlete_id", "occurred_at", "id"),
+    Index(None, "device_id"),
+)
+
+impact_revisions = Table(
+    "impact_revisions",
+    metadata,
+    Column("impact_id", ForeignKey("impacts.id"), primary_key=True),
+    Column("revision", Integer, primary_key=True, autoincrement=False),
+    Column("athlete_id", ForeignKey("athletes.id"), index=True),
+    Column("content_digest", Digest, nullable=False),
+    Column("input_digest", Digest, nullable=False),
+    Column("document", Document, nullable=False),
+    Column("key_id", ForeignKey("api_keys.id")),
+    Column("created_at", Instant, nullable=False),
+)
+
+traces = Table(
+    "traces",
+    metadata,
+    Column("impact_id", Identifier, primary_key=True),
+    Column("revision", Integer, primary_key=True, autoincrement=False),
+    Column("signals", LargeBinary, nullable=False),
+    ForeignKeyConstraint(["impact_id", "revision"], ["impact_revisions.impact_id", "impact_revisions.revision"]),
+)
+
+scores = Table(
+    "scores",
+    metadata,
+    Column("impact_id", Identifier, primary_key=True),
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("revision", Integer, nullable=False),
+    Column("state", String(16), nullable=False),
+    Column("model", Text, nullable=False),
+    Column("incidence", Double, nullable=False),
+    Column("service_version", Text, nullable=False),
+    Column("input_digest", Digest, nullable=False),
+    *(Column(name, Double) for name in (*VALUE_COLUMNS, *PROBABILITY_COLUMNS, *PEAK_COLUMNS)),
+    Column("quality_codes", Text, nullable=False),
+    Column("details", Document, nullable=False),
+    Column("provenance", Document, nullable=False),
+    Column("created_at", Instant, nullable=False),
+    ForeignKeyConstraint(["impact_id", "revision"], ["impact_revisions.impact_id", "impact_revisions.revision"]),
+)
