@@ -120,30 +120,50 @@ def _advance(
     sample_rate_hz: float,
     oscillators: Oscillators,
 ) -> tuple[FloatArray, FloatArray]:
-    """Fill `angle` over one segment from `state`, (Re z, Im z) at its first sample, None at rest; return its last."""
-    tables = _tables(oscillators, sample_rate_hz, alpha.shape[0] - 1)
-    shape = (alpha.shape[0] - 1, *(1,) * (alpha.ndim - 2), 3)
-    now_re, now_im, last_re, last_im, back_cos, back_sin = (table.reshape(shape) for table in tables)
-    now, last = alpha[1:], alpha[:-1]
-    re = now_re * now
-    re += last_re * last
-    im = now_im * now
-    im += last_im * last
+    """Fill `angle` over one segment from `state`, (Re z, Im z) at its first sample, None at rest; return its last.
+
+    With weights g_j and u_k = sum over j < k of g_j alpha_j, the state is z_k = exp(s t_k) u_k + c1 alpha_k.
+    """
+    t = _tables(oscillators, sample_rate_hz, alpha.shape[0] - 1)
+    weight_re, weight_im, back_cos, back_sin = t.spread(alpha.ndim)
+    past = alpha[:-1]
+    re = weight_re * past
+    im = weight_im * past
+    # the first sample of a segment has no share of c1: there the state is given
+    re[0] -= t.c1[0] * past[0]
+    im[0] -= t.c1[1] * past[0]
     if state is not None:
         re[0] += state[0]
         im[0] += state[1]
     re = running_sum(re)
     im = running_sum(im)
-    last_step = (re[-1] * back_cos[-1] - im[-1] * back_sin[-1], re[-1] * back_sin[-1] + im[-1] * back_cos[-1])
+    end_re = re[-1] * back_cos[-1] - im[-1] * back_sin[-1] + t.c1[0] * alpha[-1]
     re *= back_sin
     im *= back_cos
-    np.add(re, im, out=angle[1:])
-    return last_step
+    re += im
+    np.multiply(alpha[1:], t.c1[1], out=angle[1:])
+    angle[1:] += re
+    return end_re, angle[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class _Tables:
+    """What one segment needs: weights g_j = exp(-s t_j) (c1 + c0 exp(-s dt)), real and imaginary; exp(s t_k) of its
+    steps k = 1, 2, ..., likewise; c1, likewise."""
+
+    weights_and_back: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    c1: tuple[NDArray[np.floating], NDArray[np.floating]]
+
+    def spread(self, ndim: int) -> tuple[FloatArray, ...]:
+        """The tables with axes for as many dimensions as the signal has."""
+        if ndim == 2:
+            return self.weights_and_back
+        return tuple(table[:, None, :] for table in self.weights_and_back)
 
 
 @lru_cache(maxsize=64)
-def _tables(oscillators: Oscillators, sample_rate_hz: float, steps: int) -> tuple[FloatArray, ...]:
-    """Weights of one segment: first-order-hold weights times exp(-s t_k), then exp(s t_k) to come back.
+def _tables(oscillators: Oscillators, sample_rate_hz: float, steps: int) -> _Tables:
+    """First-order-hold weights.
 
     z_k = exp(s dt) z_(k-1) + c0 alpha_(k-1) + c1 alpha_k with, for X = s dt,
     c1 = -(dt/wd) phi2(X), c0 = -(dt/wd) (phi1(X) - phi2(X)), phi1 = (exp(X) - 1)/X, phi2 = (exp(X) - 1 - X)/X^2,
@@ -154,12 +174,13 @@ def _tables(oscillators: Oscillators, sample_rate_hz: float, steps: int) -> tupl
     s = -np.array(oscillators.decay_rate) + 1j * wd
     phi1 = sum((s * dt) ** j / factorial(j + 1) for j in range(TAYLOR_TERMS))
     phi2 = sum((s * dt) ** j / factorial(j + 2) for j in range(TAYLOR_TERMS))
-    t = np.arange(1, steps + 1)[:, None] * dt
-    forward = np.exp(-s * t)
-    now = -(dt / wd) * phi2 * forward
-    last = -(dt / wd) * (phi1 - phi2) * forward
-    back = np.exp(s * t)
-    tables = tuple(np.ascontiguousarray(x) for x in (now.real, now.imag, last.real, last.imag, back.real, back.imag))
+    c1 = -(dt / wd) * phi2
+    c0 = -(dt / wd) * (phi1 - phi2)
+    t = np.arange(steps)[:, None] * dt
+    weights = np.exp(-s * t) * (c1 + c0 * np.exp(-s * dt))
+    back = np.exp(s * (t + dt))
+    # laid out by component, as single impacts are
+    tables = tuple(np.asfortranarray(x) for x in (weights.real, weights.imag, back.real, back.imag))
     for table in tables:
         table.flags.writeable = False
-    return tables
+    return _Tables((tables[0], tables[1], tables[2], tables[3]), (c1.real, c1.imag))

@@ -85,7 +85,7 @@ def low_pass(x: FloatArray, corner_hz: float, sample_rate_hz: float) -> FloatArr
     forward, _ = signal.lfilter(b, a, extended, axis=0, zi=rest * extended[:1])
     backward, _ = signal.lfilter(b, a, forward[::-1], axis=0, zi=rest * forward[-1:])
     margin = (extended.shape[0] - x.shape[0]) // 2
-    return np.ascontiguousarray(backward[::-1][margin : margin + x.shape[0]])
+    return np.asfortranarray(backward[::-1][margin : margin + x.shape[0]])
 
 
 @lru_cache(maxsize=256)

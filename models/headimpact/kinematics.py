@@ -72,24 +72,41 @@ class HeadKinematics:
         return np.sqrt(self.angular_acceleration_squared)
 
     @cached_property
-    def angular_velocity_resultant(self) -> FloatArray:
-        """Norm of the angular velocity [rad/s]."""
-        return np.sqrt(squared_norm(_present(self.angular_velocity, "angular_velocity")))
-
-    @cached_property
     def peak_linear_acceleration_components_g(self) -> FloatArray:
         """Largest absolute value of each component [g]."""
         return largest(np.abs(_present(self.linear_acceleration_g, "linear_acceleration")))
 
     @cached_property
+    def angular_velocity_extremes(self) -> tuple[FloatArray, FloatArray]:
+        """Smallest and largest value of each component [rad/s]."""
+        w = _present(self.angular_velocity, "angular_velocity")
+        return np.minimum.reduce(w, axis=0), largest(w)
+
+    @cached_property
     def peak_angular_velocity_components(self) -> FloatArray:
         """Largest absolute value of each component [rad/s]."""
-        return largest(np.abs(_present(self.angular_velocity, "angular_velocity")))
+        lowest, highest = self.angular_velocity_extremes
+        return np.maximum(-lowest, highest)
 
     @cached_property
     def peak_angular_acceleration_components(self) -> FloatArray:
         """Largest absolute value of each component [rad/s^2]."""
         return largest(np.abs(_present(self.angular_acceleration, "angular_acceleration")))
+
+    @cached_property
+    def peak_linear_acceleration_g(self) -> FloatArray:
+        """Largest norm of the linear acceleration [g]."""
+        return np.sqrt(largest(self.linear_acceleration_squared))
+
+    @cached_property
+    def peak_angular_velocity(self) -> FloatArray:
+        """Largest norm of the angular velocity [rad/s]."""
+        return np.sqrt(largest(squared_norm(_present(self.angular_velocity, "angular_velocity"))))
+
+    @cached_property
+    def peak_angular_acceleration(self) -> FloatArray:
+        """Largest norm of the angular acceleration [rad/s^2]."""
+        return np.sqrt(largest(self.angular_acceleration_squared))
 
     def time_ms(self, sample: int) -> float:
         """Time of a sample [ms], from the trigger where it is known."""
@@ -104,7 +121,7 @@ def _present(array: FloatArray | None, signal: str) -> FloatArray:
 
 def largest(x: FloatArray) -> FloatArray:
     """Maximum over time."""
-    return x.max(axis=0)  # type: ignore[no-any-return] # NumPy's stubs give Any here
+    return np.maximum.reduce(x, axis=0)  # type: ignore[no-any-return] # NumPy's stubs give Any here
 
 
 def squared_norm(x: FloatArray) -> FloatArray:
@@ -126,7 +143,7 @@ def running_sum(x: FloatArray) -> FloatArray:
     column, thirteen times slower, to the same result.
     """
     if x[0].size < 16:
-        return np.cumsum(x, axis=0)
+        return np.add.accumulate(x, axis=0)
     total = np.empty_like(x)
     total[0] = x[0]
     for k in range(1, x.shape[0]):

@@ -146,7 +146,10 @@ def _require_motion(signals: list[tuple[SignalName, Signal]]) -> None:
 def _uniform(name: SignalName, signal: Signal, clock_start_s: float, notes: list[QualityNote]) -> _Uniform:
     """A signal in the criteria's unit on uniform samples."""
     factor = TO_CRITERIA_UNIT[signal.unit]
-    values = signal.values if factor == 1.0 else signal.values * factor
+    # by component: every filter, maximum and sum over time is then contiguous
+    values = np.asfortranarray(signal.values, dtype=np.float64)
+    if factor != 1.0:
+        values = values * factor
     _require_within(name, values)
     if signal.time_s is None:
         assert signal.sample_rate_hz is not None

@@ -6,7 +6,7 @@ kinematics of the head's centre of gravity.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -175,8 +175,7 @@ def check_units(kinematics: HeadKinematics) -> Iterator[QualityNote]:
     if kinematics.linear_acceleration_g is None or kinematics.angular_acceleration is None:
         return
     limits = QUALITY_LIMITS["unit_check"]
-    pla = float(np.sqrt(kinematics.linear_acceleration_squared.max()))
-    paa = float(np.sqrt(kinematics.angular_acceleration_squared.max()))
+    pla, paa = float(kinematics.peak_linear_acceleration_g), float(kinematics.peak_angular_acceleration)
     if pla == 0 or paa == 0:
         return
     ratio = paa * limits["lever_arm_m"] / (pla * limits["gravity_m_s2"])
@@ -190,16 +189,19 @@ def check_units(kinematics: HeadKinematics) -> Iterator[QualityNote]:
 
 
 def check_truncation(
-    kinematics: HeadKinematics, brain_angle: FloatArray | None, pre_trigger_known: bool
+    kinematics: HeadKinematics, angle_peaks: Sequence[int] | None, pre_trigger_known: bool
 ) -> Iterator[QualityNote]:
-    """Records that end too early (the brain model is slow) or whose peak is at an edge."""
-    reasons = list(_truncation_reasons(kinematics, brain_angle, pre_trigger_known))
+    """Records that end too early (the brain model is slow) or whose peak is at an edge.
+
+    `angle_peaks` are the samples at which the brain angle peaks, by axis; 0 for an axis without rotation.
+    """
+    reasons = list(_truncation_reasons(kinematics, angle_peaks, pre_trigger_known))
     if reasons:
         yield QualityNote("record_truncated", "warning", " ".join(reasons))
 
 
 def _truncation_reasons(
-    kinematics: HeadKinematics, brain_angle: FloatArray | None, pre_trigger_known: bool
+    kinematics: HeadKinematics, angle_peaks: Sequence[int] | None, pre_trigger_known: bool
 ) -> Iterator[str]:
     limits = QUALITY_LIMITS["record"]
     last = kinematics.samples - 1
@@ -212,10 +214,9 @@ def _truncation_reasons(
         peak = int(kinematics.linear_acceleration_squared.argmax())
         if peak in (0, last) and kinematics.linear_acceleration_squared[peak] > 0:
             yield "The linear acceleration peaks at the record's edge."
-    if brain_angle is not None:
-        peaks = np.abs(brain_angle).argmax(axis=0)
-        late = peaks >= last - limits["late_peak_fraction"] * last
-        late &= np.abs(brain_angle).max(axis=0) > 0
-        if late.any():
-            axes = ", ".join(AXES[i] for i in np.flatnonzero(late))
-            yield f"The brain angle peaks in the record's last {limits['late_peak_fraction']:.0%} ({axes})."
+    if angle_peaks is not None:
+        late = (1 - limits["late_peak_fraction"]) * last
+        axes = [axis for axis, sample in zip(AXES, angle_peaks, strict=True) if sample >= late]
+        if axes:
+            share = limits["late_peak_fraction"]
+            yield f"The brain angle peaks in the record's last {share:.0%} ({', '.join(axes)})."

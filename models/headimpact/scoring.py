@@ -8,16 +8,19 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from headimpact.criteria import CRITERIA, Criterion, Evaluation, evaluate, missing_reason, present_signals
 from headimpact.criteria.extra import EXTRA_CRITERIA, ExtraCriterion
+from headimpact.criteria.windows import IntArray
 from headimpact.errors import UnknownCriterion
 from headimpact.filtering import AppliedFilter
-from headimpact.kinematics import FloatArray, HeadKinematics
+from headimpact.kinematics import FloatArray, HeadKinematics, largest, squared_norm
 from headimpact.preparation import Preparation
 from headimpact.quality import QualityNote, check_truncation, check_units
+from headimpact.recording import SIGNALS
 from headimpact.risk import LAKSARI_2020, RiskModel
 
 # Impacts per block: large enough to spread NumPy's cost per call, small enough to stay in the processor's cache.
@@ -36,8 +39,10 @@ CONVENTIONS: Mapping[str, str] = {
 Components = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class CriterionScore:
+NO_RISKS: Mapping[str, float] = {}
+
+
+class CriterionScore(NamedTuple):
     """One criterion of one impact: `value` and `probability` are None, with the `reason`, where it cannot be had."""
 
     key: str
@@ -47,7 +52,7 @@ class CriterionScore:
     linear_predictor: float | None = None
     window_ms: tuple[float, float] | None = None
     reason: str | None = None
-    risks: Mapping[str, float] = field(default_factory=dict)
+    risks: Mapping[str, float] = NO_RISKS
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,84 +175,32 @@ class _Table:
         self._model = model
         self._incidence = model.incidence if incidence is None else incidence
         self._evaluation = evaluation
-        self._missing = self._missing_signals(evaluation.kinematics)
-        self._values = self._tabulate(evaluation, impacts)
-        self._predictors = self._linear_predictors(model.incidence_shift(incidence))
+        self._missing = _missing_signals(evaluation.kinematics)
+        values = _tabulated(evaluation, impacts)
+        predictors = _linear_predictors(values, model, model.incidence_shift(incidence))
         with np.errstate(over="ignore"):
-            probabilities = 1.0 / (1.0 + np.exp(self._predictors))
-        self._value_rows = self._values.tolist()
-        self._predictor_rows = self._predictors.tolist()
-        self._probability_rows = probabilities.tolist()
+            probabilities = 1.0 / (1.0 + np.exp(predictors))
+        self._values: list[list[list[float]]] = values.tolist()
+        self._predictors: list[list[float]] = predictors.tolist()
+        self._probabilities: list[list[float]] = probabilities.tolist()
         self._windows = {
-            key: (np.atleast_1d(start).tolist(), np.atleast_1d(stop).tolist())
-            for key, (start, stop) in evaluation.windows.items()
+            key: (_rows(start, impacts), _rows(stop, impacts)) for key, (start, stop) in evaluation.windows.items()
         }
-        self._peaks = [self._peak_rows(evaluation.kinematics, name) for name in ("a", "w", "alpha")]
-        self._angles = self._angle_rows(evaluation.brain_angle)
-
-    @staticmethod
-    def _missing_signals(kinematics: HeadKinematics) -> dict[str, str]:
-        """Why each criterion that cannot be had cannot: by key."""
-        present = present_signals(kinematics)
-        absent = {criterion.key: set(criterion.needs) - present for criterion in CRITERIA}
-        return {key: missing_reason(names) for key, names in absent.items() if names}
-
-    @staticmethod
-    def _tabulate(evaluation: Evaluation, impacts: int) -> FloatArray:
-        values = np.zeros((impacts, len(CRITERIA), 3))
-        for column, criterion in enumerate(CRITERIA):
-            found = evaluation.values.get(criterion.key)
-            if found is not None:
-                if criterion.components == 3:
-                    values[:, column] = found
-                else:
-                    values[:, column, 0] = found
-        return values
-
-    def _linear_predictors(self, shift: float) -> FloatArray:
-        b0, b = self._model.coefficients
-        terms = self._values * b
-        total = terms[..., 0] + terms[..., 1]
-        total += terms[..., 2]
-        total += b0
-        if shift:
-            total += shift
-        return total
-
-    @staticmethod
-    def _peak_rows(kinematics: HeadKinematics, name: str) -> list[float] | None:
-        if name == "a" and kinematics.linear_acceleration_g is not None:
-            peak = np.sqrt(kinematics.linear_acceleration_squared.max(axis=0))
-        elif name == "w" and kinematics.angular_velocity is not None:
-            peak = kinematics.angular_velocity_resultant.max(axis=0)
-        elif name == "alpha" and kinematics.angular_acceleration is not None:
-            peak = np.sqrt(kinematics.angular_acceleration_squared.max(axis=0))
-        else:
-            return None
-        return list(np.atleast_1d(peak).tolist())
-
-    @staticmethod
-    def _angle_rows(history: FloatArray | None) -> tuple[list[float], list[list[int]]] | None:
-        if history is None:
-            return None
-        squared = history[..., 0] * history[..., 0]
-        squared += history[..., 1] * history[..., 1]
-        squared += history[..., 2] * history[..., 2]
-        resultant = np.sqrt(squared.max(axis=0))
-        samples = np.abs(history).argmax(axis=0)
-        return np.atleast_1d(resultant).tolist(), np.atleast_2d(samples).tolist()
+        self._peaks = _peak_rows(evaluation.kinematics, impacts)
+        self._angles = _angle_rows(evaluation.brain_angle, impacts)
 
     def score(self, row: int, preparation: Preparation, extras: Sequence[ExtraCriterion]) -> ImpactScore:
+        kinematics = preparation.kinematics
         criteria = {
-            criterion.key: self._criterion(row, column, criterion, preparation.kinematics)
+            criterion.key: self._criterion(row, column, criterion, kinematics)
             for column, criterion in enumerate(CRITERIA)
         }
         return ImpactScore(
             model=self._model.version,
             incidence=self._incidence,
             criteria=criteria,
-            extra_criteria={extra.key: _extra_score(extra, preparation.kinematics) for extra in extras},
-            brain_angle=self._brain_angle(row, criteria["bam"], preparation.kinematics),
+            extra_criteria={extra.key: _extra_score(extra, kinematics) for extra in extras},
+            brain_angle=self._brain_angle(row, criteria["bam"], kinematics),
             peaks=Peaks(*(None if rows is None else rows[row] for rows in self._peaks)),
             quality=preparation.notes + tuple(self._notes(row, preparation)),
             filters=preparation.filters,
@@ -260,30 +213,19 @@ class _Table:
         reason = self._missing.get(key)
         if reason is not None:
             return CriterionScore(key, None, criterion.unit, reason=reason)
-        x, y, z = self._value_rows[row][column]
+        x, y, z = self._values[row][column]
         value = (x, y, z) if criterion.components == 3 else x
+        window = self._window(row, key, kinematics) if key in self._windows else None
         if key not in self._model.curves:
-            return CriterionScore(
-                key,
-                value,
-                criterion.unit,
-                window_ms=self._window(row, key, kinematics),
-                reason=f"Model {self._model.version} has no curve for it.",
-            )
+            reason = f"Model {self._model.version} has no curve for it."
+            return CriterionScore(key, value, criterion.unit, window_ms=window, reason=reason)
         return CriterionScore(
-            key,
-            value,
-            criterion.unit,
-            self._probability_rows[row][column],
-            self._predictor_rows[row][column],
-            self._window(row, key, kinematics),
+            key, value, criterion.unit, self._probabilities[row][column], self._predictors[row][column], window
         )
 
     def _window(self, row: int, key: str, kinematics: HeadKinematics) -> tuple[float, float] | None:
-        found = self._windows.get(key)
-        if found is None:
-            return None
-        start, stop = found[0][row], found[1][row]
+        starts, stops = self._windows[key]
+        start, stop = starts[row], stops[row]
         return None if start == stop else (kinematics.time_ms(start), kinematics.time_ms(stop))
 
     def _brain_angle(self, row: int, bam: CriterionScore, kinematics: HeadKinematics) -> BrainAngle | None:
@@ -294,11 +236,65 @@ class _Table:
         return BrainAngle(bam.value, resultants[row], (x, y, z))
 
     def _notes(self, row: int, preparation: Preparation) -> Iterable[QualityNote]:
-        history = self._evaluation.brain_angle
-        if history is not None and history.ndim == 3:
-            history = history[:, row]
+        angle_peaks = None if self._angles is None else self._angles[1][row]
         yield from check_units(preparation.kinematics)
-        yield from check_truncation(preparation.kinematics, history, preparation.pre_trigger_known)
+        yield from check_truncation(preparation.kinematics, angle_peaks, preparation.pre_trigger_known)
+
+
+def _missing_signals(kinematics: HeadKinematics) -> dict[str, str]:
+    """Why each criterion that cannot be had cannot: by key."""
+    present = present_signals(kinematics)
+    if len(present) == len(SIGNALS):
+        return {}
+    absent = {criterion.key: set(criterion.needs) - present for criterion in CRITERIA}
+    return {key: missing_reason(names) for key, names in absent.items() if names}
+
+
+def _tabulated(evaluation: Evaluation, impacts: int) -> FloatArray:
+    """Values as impacts x criteria x 3, zero where a criterion has one component or none."""
+    values = np.zeros((impacts, len(CRITERIA), 3))
+    for column, criterion in enumerate(CRITERIA):
+        found = evaluation.values.get(criterion.key)
+        if found is not None:
+            if criterion.components == 3:
+                values[:, column] = found
+            else:
+                values[:, column, 0] = found
+    return values
+
+
+def _linear_predictors(values: FloatArray, model: RiskModel, shift: float) -> FloatArray:
+    b0, b = model.coefficients
+    terms = values * b
+    total: FloatArray = terms[..., 0] + terms[..., 1]
+    total += terms[..., 2]
+    total += b0
+    total += shift
+    return total
+
+
+def _rows(found: FloatArray | IntArray, impacts: int) -> list[Any]:
+    """One entry per impact of something evaluated on one impact or on a block."""
+    return [found.tolist()] if impacts == 1 and found.ndim == 0 else found.tolist()
+
+
+def _peak_rows(kinematics: HeadKinematics, impacts: int) -> tuple[list[float] | None, ...]:
+    """Peak resultants of linear acceleration, angular velocity and angular acceleration, one per impact."""
+    k = kinematics
+    return (
+        None if k.linear_acceleration_g is None else _rows(k.peak_linear_acceleration_g, impacts),
+        None if k.angular_velocity is None else _rows(k.peak_angular_velocity, impacts),
+        None if k.angular_acceleration is None else _rows(k.peak_angular_acceleration, impacts),
+    )
+
+
+def _angle_rows(history: FloatArray | None, impacts: int) -> tuple[list[float], list[list[int]]] | None:
+    """Peak resultant brain angle of each impact, and the sample at which each axis peaks."""
+    if history is None:
+        return None
+    resultants = _rows(np.sqrt(largest(squared_norm(history))), impacts)
+    samples = np.abs(history).argmax(axis=0).tolist()
+    return resultants, [samples] if history.ndim == 2 else samples
 
 
 def _extra_score(extra: ExtraCriterion, kinematics: HeadKinematics) -> CriterionScore:

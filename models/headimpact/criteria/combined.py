@@ -44,8 +44,7 @@ def gambit(kinematics: HeadKinematics) -> FloatArray:
 
 def vtcp(kinematics: HeadKinematics) -> FloatArray:
     """Virginia Tech combined probability (Rowson & Duma 2013) of the peak resultants [-]."""
-    a = np.sqrt(largest(kinematics.linear_acceleration_squared))
-    alpha = np.sqrt(largest(kinematics.angular_acceleration_squared))
+    a, alpha = kinematics.peak_linear_acceleration_g, kinematics.peak_angular_acceleration
     linear_predictor = (
         VTCP["intercept"]
         + VTCP["linear_acceleration_per_g"] * a

@@ -114,23 +114,19 @@ def _risk_weight(name: str, peak: float) -> ExtraValue:
     return ExtraValue(1.0 / (1.0 + exp(-(constants["intercept"] + constants["slope"] * peak))))
 
 
-def _peak_linear_g(kinematics: HeadKinematics) -> float:
-    return sqrt(float(kinematics.linear_acceleration_squared.max()))
-
-
 def rwe_linear_collegiate(kinematics: HeadKinematics) -> ExtraValue:
     """This impact's share of the linear risk-weighted exposure, collegiate curve (Urban et al. 2013) [-]."""
-    return _risk_weight("rwe_linear_collegiate", _peak_linear_g(kinematics))
+    return _risk_weight("rwe_linear_collegiate", float(kinematics.peak_linear_acceleration_g))
 
 
 def rwe_linear_nfl(kinematics: HeadKinematics) -> ExtraValue:
     """This impact's share of the linear risk-weighted exposure, NFL curve (Urban et al. 2013) [-]."""
-    return _risk_weight("rwe_linear_nfl", _peak_linear_g(kinematics))
+    return _risk_weight("rwe_linear_nfl", float(kinematics.peak_linear_acceleration_g))
 
 
 def rwe_rotational(kinematics: HeadKinematics) -> ExtraValue:
     """This impact's share of the rotational risk-weighted exposure (Urban et al. 2013) [-]."""
-    return _risk_weight("rwe_rotational", sqrt(float(kinematics.angular_acceleration_squared.max())))
+    return _risk_weight("rwe_rotational", float(kinematics.peak_angular_acceleration))
 
 
 def rwe_combined(kinematics: HeadKinematics) -> ExtraValue:

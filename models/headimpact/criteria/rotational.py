@@ -10,7 +10,7 @@ import numpy as np
 
 from headimpact.brain import brain_angle_history
 from headimpact.criteria.windows import FloatArray, IntArray, window_maxima
-from headimpact.kinematics import HeadKinematics, largest
+from headimpact.kinematics import HeadKinematics
 from headimpact.published import CRITERIA_CONSTANTS
 
 CRITICAL_ANGULAR_VELOCITY: FloatArray = np.array(CRITERIA_CONSTANTS["bric"]["critical_angular_velocity_rad_s"])
@@ -24,9 +24,8 @@ def peak_angular_acceleration(kinematics: HeadKinematics) -> FloatArray:
 
 def delta_angular_velocity(kinematics: HeadKinematics) -> FloatArray:
     """Largest minus smallest angular velocity about each axis [rad/s]."""
-    w = kinematics.angular_velocity
-    assert w is not None
-    return largest(w) + largest(-w)
+    lowest, highest = kinematics.angular_velocity_extremes
+    return highest - lowest
 
 
 def bric(kinematics: HeadKinematics, critical: FloatArray = CRITICAL_ANGULAR_VELOCITY) -> FloatArray:

@@ -7,10 +7,10 @@ largest integral M(k), so the value is M(k)^2.5 / (k dt)^1.5 and one power per l
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import floor, sqrt
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from headimpact.kinematics import running_integral
@@ -66,10 +66,18 @@ def _stack(found: list[tuple[float, int, int]]) -> tuple[FloatArray, IntArray, I
     return np.array(value), np.array(start, dtype=np.intp), np.array(stop, dtype=np.intp)
 
 
-def _value(largest_integral: FloatArray, duration: FloatArray) -> FloatArray:
-    """M^2.5 / T^1.5, by products and roots: exact to a rounding and several times faster than a power."""
-    m, t = largest_integral, duration
-    return m * m * np.sqrt(m) / (t * np.sqrt(t))
+def _value(m: FloatArray, duration_to_1_5: FloatArray) -> FloatArray:
+    """M^2.5 / T^1.5, by products and roots: several times faster than powers."""
+    return m * m * np.sqrt(m) / duration_to_1_5
+
+
+@lru_cache(maxsize=64)
+def _durations(longest: int, sample_rate_hz: float) -> FloatArray:
+    """T^1.5 of windows of 1 to `longest` intervals [s^1.5]."""
+    t = np.arange(1, longest + 1) / sample_rate_hz
+    durations: FloatArray = t * np.sqrt(t)
+    durations.flags.writeable = False
+    return durations
 
 
 def _block(
@@ -77,14 +85,13 @@ def _block(
 ) -> list[tuple[FloatArray, IntArray, IntArray]]:
     """Every window length of a block of impacts: subtract and take the maximum, once per length."""
     n, m = integral.shape
-    largest = np.empty((max(lengths), m))
+    longest = lengths[-1]
+    largest = np.empty((longest, m))
     difference = np.empty((n - 1, m))
-    for k in range(1, max(lengths) + 1):
-        rows = difference[: n - k]
-        np.subtract(integral[k:], integral[:-k], out=rows)
-        rows.max(axis=0, out=largest[k - 1])
-    durations = np.arange(1, max(lengths) + 1)[:, None] / sample_rate_hz
-    values = _value(largest, durations)
+    for k in range(1, longest + 1):
+        rows = np.subtract(integral[k:], integral[:-k], out=difference[: n - k])
+        np.maximum.reduce(rows, axis=0, out=largest[k - 1])
+    values = _value(largest, _durations(longest, sample_rate_hz)[:, None])
     results = []
     for length in lengths:
         best = values[:length].argmax(axis=0)
@@ -116,16 +123,19 @@ def _window(integral: FloatArray, value: float, k: int) -> tuple[float, int, int
 
 
 def _single_by_table(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> list[tuple[float, int, int]]:
-    """All windows of a short record in one table.
+    """All windows of a short record in one table, a row per length.
 
     The integral is continued by its last value. A window that overhangs the end is then a longer one with the same
     integral as the window that stops there, so it never wins.
     """
     longest = lengths[-1]
-    continued = np.concatenate((integral, np.full(longest, integral[-1])))
-    windows = sliding_window_view(continued, longest + 1)[: integral.size - 1]
-    largest = (windows[:, 1:] - windows[:, :1]).max(axis=0)
-    values = _value(largest, np.arange(1, longest + 1) / sample_rate_hz)
+    continued = np.empty(integral.size + longest)
+    continued[: integral.size] = integral
+    continued[integral.size :] = integral[-1]
+    step = continued.itemsize
+    ends = np.ndarray((longest, integral.size - 1), np.float64, continued, step, (step, step))
+    largest = np.maximum.reduce(ends - integral[:-1], axis=1)
+    values = _value(largest, _durations(longest, sample_rate_hz))
     found = []
     for length in lengths:
         best = int(values[:length].argmax())
