@@ -84,11 +84,11 @@ def low_pass(choice: str | FilterBody) -> LowPass:
     return PAPER if choice == "paper" else NO_FILTER
 
 
-def mounting(body: MountingBody) -> Mounting:
-    """A mounting of a request; 422 `improper-rotation` for a matrix that is no rotation."""
+def mounting(body: MountingBody, place: str = "/kinematics/mounting") -> Mounting:
+    """A mounting of a request; 422 `improper-rotation`, pointing below `place`, for a matrix that is no rotation."""
     gyroscope = body.gyroscope or body.accelerometer
-    _require_rotation(body.accelerometer.rotation, "accelerometer")
-    _require_rotation(gyroscope.rotation, "gyroscope" if body.gyroscope else "accelerometer")
+    _require_rotation(body.accelerometer.rotation, "accelerometer", place)
+    _require_rotation(gyroscope.rotation, "gyroscope" if body.gyroscope else "accelerometer", place)
     return Mounting(
         accelerometer_rotation=np.array(body.accelerometer.rotation),
         gyroscope_rotation=np.array(gyroscope.rotation),
@@ -96,11 +96,11 @@ def mounting(body: MountingBody) -> Mounting:
     )
 
 
-def _require_rotation(rotation: list[list[float]], sensor: str) -> None:
+def _require_rotation(rotation: list[list[float]], sensor: str, place: str) -> None:
     try:
         require_proper_rotation(np.array(rotation), sensor)
     except TraceError as error:
-        fault = PayloadError(detail=str(error), code=error.code, pointer=f"/kinematics/mounting/{sensor}/rotation")
+        fault = PayloadError(detail=str(error), code=error.code, pointer=f"{place}/{sensor}/rotation")
         raise Problem("improper-rotation", str(error), errors=[fault]) from None
 
 
