@@ -22,7 +22,7 @@ from math import factorial, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from headimpact.kinematics import largest, running_sum, squared_norm
+from headimpact.kinematics import accumulate, largest, largest_magnitude, squared_norm
 from headimpact.published import BRAIN_MODEL
 
 FloatArray = NDArray[np.float64]
@@ -30,6 +30,9 @@ FloatArray = NDArray[np.float64]
 # The running sum holds exp(+L t): a record is cut where that factor reaches exp(16), long before digits are lost.
 LARGEST_EXPONENT = 16.0
 TAYLOR_TERMS = 20
+
+# Impacts of a batch that are solved together.
+BLOCK = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,16 +76,18 @@ def brain_angle_history(
     ndarray
         Brain angles [rad], of the shape of the input.
     """
-    n = angular_acceleration.shape[0]
-    segment = _segment_length(oscillators, sample_rate_hz)
-    angle = np.empty_like(angular_acceleration)
-    angle[0] = 0.0
-    state: tuple[FloatArray, FloatArray] | None = None
-    for start in range(0, n - 1, segment):
-        stop = min(start + segment, n - 1)
-        state = _advance(
-            angular_acceleration[start : stop + 1], angle[start : stop + 1], state, sample_rate_hz, oscillators
-        )
+    alpha = angular_acceleration
+    angle = np.empty_like(alpha)
+    if alpha.ndim == 2:
+        _fill(alpha, angle, np.empty_like(alpha), np.empty_like(alpha), sample_rate_hz, oscillators)
+        return angle
+    # a block at a time, in two buffers that stay in the processor's cache
+    re = np.empty((alpha.shape[0], min(BLOCK, alpha.shape[1]), 3))
+    im = np.empty_like(re)
+    for first in range(0, alpha.shape[1], BLOCK):
+        block = slice(first, first + BLOCK)
+        width = alpha[:, block].shape[1]
+        _fill(alpha[:, block], angle[:, block], re[:, :width], im[:, :width], sample_rate_hz, oscillators)
     return angle
 
 
@@ -106,43 +111,63 @@ def peak_brain_angles(
         Peaks per axis (3 or m x 3) and of the resultant (scalar or m).
     """
     angle = brain_angle_history(angular_acceleration, sample_rate_hz, oscillators)
-    return largest(np.abs(angle)), np.sqrt(largest(squared_norm(angle)))
+    return largest_magnitude(angle), np.sqrt(largest(squared_norm(angle)))
 
 
 def _segment_length(oscillators: Oscillators, sample_rate_hz: float) -> int:
     return max(1, int(LARGEST_EXPONENT / max(oscillators.decay_rate) * sample_rate_hz))
 
 
+def _fill(
+    alpha: FloatArray,
+    angle: FloatArray,
+    re: FloatArray,
+    im: FloatArray,
+    sample_rate_hz: float,
+    oscillators: Oscillators,
+) -> None:
+    """Fill `angle`, segment by segment; `re` and `im` are buffers of its shape."""
+    steps = alpha.shape[0] - 1
+    segment = _segment_length(oscillators, sample_rate_hz)
+    angle[0] = 0.0
+    state: tuple[FloatArray, FloatArray] | None = None
+    for start in range(0, steps, segment):
+        stop = min(start + segment, steps)
+        tables = _tables(oscillators, sample_rate_hz, stop - start)
+        span, buffers = slice(start, stop + 1), (re[start:stop], im[start:stop])
+        state = _advance(alpha[span], angle[span], buffers, state, tables)
+
+
 def _advance(
     alpha: FloatArray,
     angle: FloatArray,
+    buffers: tuple[FloatArray, FloatArray],
     state: tuple[FloatArray, FloatArray] | None,
-    sample_rate_hz: float,
-    oscillators: Oscillators,
+    tables: _Tables,
 ) -> tuple[FloatArray, FloatArray]:
     """Fill `angle` over one segment from `state`, (Re z, Im z) at its first sample, None at rest; return its last.
 
     With weights g_j and u_k = sum over j < k of g_j alpha_j, the state is z_k = exp(s t_k) u_k + c1 alpha_k.
     """
-    t = _tables(oscillators, sample_rate_hz, alpha.shape[0] - 1)
-    weight_re, weight_im, back_cos, back_sin = t.spread(alpha.ndim)
-    past = alpha[:-1]
-    re = weight_re * past
-    im = weight_im * past
+    weight_re, weight_im, back_cos, back_sin = tables.spread(alpha.ndim)
+    c1_re, c1_im = tables.c1
+    past, now = alpha[:-1], angle[1:]
+    re = np.multiply(weight_re, past, out=buffers[0])
+    im = np.multiply(weight_im, past, out=buffers[1])
     # the first sample of a segment has no share of c1: there the state is given
-    re[0] -= t.c1[0] * past[0]
-    im[0] -= t.c1[1] * past[0]
+    re[0] -= c1_re * past[0]
+    im[0] -= c1_im * past[0]
     if state is not None:
         re[0] += state[0]
         im[0] += state[1]
-    re = running_sum(re)
-    im = running_sum(im)
-    end_re = re[-1] * back_cos[-1] - im[-1] * back_sin[-1] + t.c1[0] * alpha[-1]
+    accumulate(re)
+    accumulate(im)
+    end_re = re[-1] * back_cos[-1] - im[-1] * back_sin[-1] + c1_re * alpha[-1]
     re *= back_sin
     im *= back_cos
-    re += im
-    np.multiply(alpha[1:], t.c1[1], out=angle[1:])
-    angle[1:] += re
+    np.multiply(alpha[1:], c1_im, out=now)
+    now += re
+    now += im
     return end_re, angle[-1]
 
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from headimpact.criteria import combined, rotational, translational
 from headimpact.criteria.windows import FloatArray, IntArray
-from headimpact.kinematics import HeadKinematics
+from headimpact.kinematics import HeadKinematics, largest_magnitude
 from headimpact.recording import SignalName
 
 Window = tuple[IntArray, IntArray]
@@ -31,7 +29,7 @@ def _rotation(evaluation: Evaluation) -> None:
     evaluation.values["ric"] = value
     evaluation.windows["ric"] = (start, stop)
     evaluation.brain_angle = rotational.brain_angle(evaluation.kinematics)
-    evaluation.values["bam"] = np.abs(evaluation.brain_angle).max(axis=0)
+    evaluation.values["bam"] = largest_magnitude(evaluation.brain_angle)
 
 
 def _velocity(evaluation: Evaluation) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from headimpact.criteria.windows import FloatArray, IntArray, window_maxima
-from headimpact.kinematics import HeadKinematics, running_sum
+from headimpact.kinematics import HeadKinematics, accumulate
 from headimpact.published import CRITERIA_CONSTANTS
 
 HIC15_LIMIT_S = float(CRITERIA_CONSTANTS["windows"]["hic15_s"])
@@ -32,5 +32,6 @@ def severity_index(kinematics: HeadKinematics) -> FloatArray:
     a2 = kinematics.linear_acceleration_squared
     power = a2 * np.sqrt(kinematics.linear_acceleration_resultant_g)
     # added in the order of time, so that one impact and a block of many give the same bits
-    total: FloatArray = running_sum(power)[-1] - 0.5 * (power[0] + power[-1])
+    ends = 0.5 * (power[0] + power[-1])
+    total: FloatArray = accumulate(power)[-1] - ends
     return total / kinematics.sample_rate_hz
