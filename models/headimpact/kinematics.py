@@ -138,7 +138,8 @@ def squared_norm(x: FloatArray) -> FloatArray:
 
 def largest_magnitude(x: FloatArray) -> FloatArray:
     """Maximum of the absolute value over time."""
-    return np.maximum(-np.minimum.reduce(x, axis=0), largest(x))
+    magnitude: FloatArray = np.maximum(-np.minimum.reduce(x, axis=0), largest(x))
+    return magnitude
 
 
 def accumulate(x: FloatArray) -> FloatArray:
@@ -148,7 +149,7 @@ def accumulate(x: FloatArray) -> FloatArray:
     column, thirteen times slower, to the same result.
     """
     if x[0].size < 16:
-        return np.add.accumulate(x, axis=0, out=x)  # type: ignore[no-any-return] # NumPy's stubs give Any here
+        return np.add.accumulate(x, axis=0, out=x)
     for k in range(1, x.shape[0]):
         np.add(x[k - 1], x[k], out=x[k])
     return x
