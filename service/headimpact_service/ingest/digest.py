@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ import numpy as np
 from headimpact.recording import Mounting, Recording, Signal
 from headimpact_service.ingest.record import ImpactRecord
 
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_MICROSECOND = timedelta(microseconds=1)
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 VERSION = 1
@@ -41,7 +44,7 @@ def digests(record: ImpactRecord, *, athlete: str | None = None) -> Digests:
         "context": dict(record.context),
         "device": record.device_serial,
         "kinematics": kinematics,
-        "occurred_at": None if record.occurred_at is None else record.occurred_at.timestamp(),
+        "occurred_at": None if record.occurred_at is None else (record.occurred_at - _EPOCH) // _MICROSECOND,
         "unscorable": list(record.unscorable),
     }
     return Digests(input=kinematics, content=_named(hashlib.sha256(_canonical(members)).hexdigest()))

@@ -1,0 +1,163 @@
+"""CSV: separated text with a line of headings.
+
+Comma, semicolon or tab, one of them for the whole file; UTF-8 with or without its mark, else Latin-1; decimal points.
+What is not a number stays a fault of its own impact; what makes the rows uncertain (a row longer or shorter than the
+headings, a decimal comma, a line without end) is a fault of the file.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from itertools import chain, islice
+
+import numpy as np
+
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.presets import preset_named
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.table import Columns, FloatArray
+from headimpact_service.ingest.tabular import read_table
+
+MAX_LINE = 256 * 1024
+MAX_COLUMNS = 1024
+ROWS_AT_ONCE = 8192
+_DELIMITERS = (",", ";", "\t")
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*")
+# float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
+_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
+
+
+def read_csv(data: bytes, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+    """The impacts of a CSV file."""
+    return read_table(CsvTable(data, skip_rows=_skip_rows(options)), options, format_name="csv")
+
+
+def _skip_rows(options: ImportOptions) -> int:
+    """Lines above the headings: they must be known before the headings can be looked at."""
+    if options.mapping is not None and options.mapping.skip_rows is not None:
+        return options.mapping.skip_rows
+    return 0 if options.preset is None else preset_named(options.preset).mapping.skip_rows or 0
+
+
+class CsvTable:
+    """The headings of a CSV file, and its columns when they are asked for."""
+
+    def __init__(self, data: bytes, *, skip_rows: int = 0) -> None:
+        """Read as far as the headings; 422 where there are none."""
+        _require_text(data)
+        self._lines = io.TextIOWrapper(io.BytesIO(data), encoding=_encoding(data), newline="")
+        heading = self._first_line(skip_rows)
+        self._delimiter = _delimiter(heading)
+        self._rows = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
+        self.headings: tuple[str, ...] = tuple(self._next_rows(1)[0])
+        if len(self.headings) > MAX_COLUMNS:
+            raise _unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
+
+    def read(self, numbers: Sequence[int], texts: Sequence[int], max_rows: int) -> Columns:
+        """The columns, block by block, so that only numbers are kept of the numbers."""
+        blocks: dict[int, list[FloatArray]] = {index: [] for index in numbers}
+        words: dict[int, list[str]] = {index: [] for index in texts}
+        count = 0
+        for cells in self._blocks():
+            count += len(cells[0])
+            if count > max_rows:
+                raise _unreadable(f"An impact may have at most {max_rows} samples; a mapping's group_by parts a file.")
+            for index in numbers:
+                blocks[index].append(self._numbers(cells[index]))
+            for index in texts:
+                words[index] += cells[index]
+        joined = {index: np.concatenate(parts or [np.empty(0)]) for index, parts in blocks.items()}
+        return Columns(rows=count, numbers=joined, texts=words)
+
+    def _first_line(self, skip_rows: int) -> str:
+        """The line of headings: the first that is neither skipped, empty nor a comment."""
+        for line in islice(self._lines, skip_rows, None):
+            if line.strip() and not line.startswith("#"):
+                return line
+        raise _unreadable("The file has no line of headings.")
+
+    def _blocks(self) -> Iterator[list[tuple[str, ...]]]:
+        """The cells by column, some thousand rows at a time."""
+        while rows := self._next_rows(ROWS_AT_ONCE):
+            full = [row for row in rows if row]
+            if set(map(len, full)) - {len(self.headings)}:
+                full = [fitted for row in full if (fitted := self._fitted(row))]
+            if full:
+                yield list(zip(*full, strict=True))
+
+    def _next_rows(self, count: int) -> list[list[str]]:
+        try:
+            return list(islice(self._rows, count))
+        except csv.Error:
+            raise _unreadable(f"The quotes around line {self._rows.line_num} do not match.") from None
+
+    def _fitted(self, row: list[str]) -> list[str]:
+        """A row as long as the headings: spreadsheets add empty cells at the end, and rows of nothing else."""
+        width = len(self.headings)
+        if not any(cell.strip() for cell in row):
+            return []
+        if len(row) < width or any(cell.strip() for cell in row[width:]):
+            raise _unreadable(
+                f"A row up to line {self._rows.line_num} has {len(row)} cells where the headings have {width}."
+            )
+        return row[:width]
+
+    def _numbers(self, cells: Sequence[str]) -> FloatArray:
+        """A block of one column; NaN where a cell is no number."""
+        text = "".join(cells)
+        if text.isascii() and "_" not in text:
+            try:
+                return np.fromiter(map(float, cells), dtype=np.float64, count=len(cells))
+            except ValueError:
+                pass
+        return np.array([self._number(cell) for cell in cells], dtype=np.float64)
+
+    def _number(self, cell: str) -> float:
+        if _NUMBER.fullmatch(cell) is not None:
+            return float(cell)
+        if self._delimiter != "," and _DECIMAL_COMMA.fullmatch(cell) is not None:
+            raise _unreadable("Numbers are written with a decimal point; this file has decimal commas.")
+        return float("nan")
+
+
+def _require_text(data: bytes) -> None:
+    """Refuse what would make a text reader hold a great deal at once, before it starts."""
+    if b"\0" in data:
+        raise _unreadable("A text file holds no NUL bytes.")
+    start, end = 0, len(data)
+    while end - start > MAX_LINE:
+        window = start + MAX_LINE
+        last = max(data.rfind(b"\n", start, window), data.rfind(b"\r", start, window))
+        if last < 0:
+            raise _unreadable(f"A line may have at most {MAX_LINE} bytes.")
+        start = last + 1
+
+
+def _encoding(data: bytes) -> str:
+    if data.startswith(codecs.BOM_UTF8):
+        return "utf-8-sig"
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _delimiter(heading: str) -> str:
+    """The one separator of the headings outside quotes; where two occur, the one that occurs more often."""
+    bare = re.sub(r'"[^"]*"', "", heading)
+    counts = sorted(((bare.count(delimiter), delimiter) for delimiter in _DELIMITERS), reverse=True)
+    if counts[0][0] == 0:
+        raise _unreadable("The headings are not separated by commas, semicolons or tabs.")
+    if counts[0][0] == counts[1][0]:
+        raise _unreadable("The headings hold two separators equally often: use one for the whole file.")
+    return counts[0][1]
+
+
+def _unreadable(detail: str) -> Problem:
+    return Problem("unreadable-file", detail)

@@ -1,0 +1,146 @@
+"""Column headings: finding a named one whatever its spelling, and understanding one that says what it holds."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from headimpact.recording import AXES, SIGNALS, SignalName
+from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest import mapping as mappings
+
+_NO_SIGN_OR_LETTER = re.compile(r"[^0-9a-z]+")
+_WORDED = str.maketrans({"°": "deg", "µ": "u", "μ": "u"})
+MAX_COMPACT = 200
+
+
+def compact(heading: str) -> str:
+    """A heading without what people spell differently: case, spaces, punctuation, `²` for `2`, `µ` for `u`."""
+    plain = unicodedata.normalize("NFKC", heading[:MAX_COMPACT].translate(_WORDED)).casefold()
+    return _NO_SIGN_OR_LETTER.sub("", plain)
+
+
+class Headings:
+    """The headings of one table, to be looked up by any of a column's spellings."""
+
+    def __init__(self, headings: Sequence[str]) -> None:
+        """Index the headings as written and as :func:`compact` has them."""
+        self.written = tuple(heading.strip() for heading in headings)
+        self._exact = _places(self.written)
+        self._compact = _places([compact(heading) for heading in self.written])
+
+    def find(self, spellings: Sequence[str]) -> int | None:
+        """The column that one of the spellings names; a heading as written wins over a looser match.
+
+        Raises
+        ------
+        Problem
+            422, where one spelling names two columns.
+        """
+        for index, spelling in ((self._exact, str.strip), (self._compact, compact)):
+            for name in spellings:
+                places = index.get(spelling(name), ())
+                if len(places) > 1:
+                    raise layout_problem("Two columns of the file have the same heading.", code="heading-twice")
+                if places:
+                    return places[0]
+        return None
+
+
+def _places(names: Sequence[str]) -> dict[str, list[int]]:
+    places: dict[str, list[int]] = {}
+    for index, name in enumerate(names):
+        if name:
+            places.setdefault(name, []).append(index)
+    return places
+
+
+def layout_problem(detail: str, *, code: str, parameter: str = "mapping", pointer: str | None = None) -> Problem:
+    """The 422 for a table whose columns do not give what an impact needs."""
+    fault = PayloadError(detail=detail, code=code, parameter=parameter, pointer=pointer)
+    return Problem("unreadable-file", detail, errors=[fault])
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What one heading says: a component of a signal or the time, and the unit if it names one."""
+
+    signal: SignalName | None
+    axis: str | None
+    unit: str | None
+
+
+class Vocabulary:
+    """The words and units that headings are made of, and every heading that they make."""
+
+    def __init__(self, table: Mapping[str, Any]) -> None:
+        """Spell out all headings of a preset's vocabulary."""
+        self._meanings: dict[str, Meaning] = {}
+        for signal in SIGNALS:
+            self._learn(signal, table[signal])
+        for word in table["time"]["words"]:
+            for unit, spellings in _units(table["time"]):
+                self._add(compact(word) + spellings, Meaning(None, None, unit))
+
+    def _learn(self, signal: SignalName, words_and_units: Mapping[str, Any]) -> None:
+        words = [compact(word) for word in words_and_units["words"]]
+        for word in words:
+            for axis in AXES:
+                for unit, spelling in _units(words_and_units):
+                    for stem in _stems(word, axis):
+                        self._add(stem + spelling, Meaning(signal, axis, unit))
+
+    def _add(self, heading: str, meaning: Meaning) -> None:
+        if self._meanings.setdefault(heading, meaning) != meaning:
+            raise ValueError(f"The vocabulary gives the heading {heading} two meanings.")
+
+    def understand(self, heading: str) -> Meaning | None:
+        """What a heading says, if it is made of known words."""
+        return self._meanings.get(compact(heading))
+
+    def mapping(self, headings: Sequence[str]) -> mappings.Mapping:
+        """The mapping that a table's headings amount to."""
+        found = [(heading, meaning) for heading in headings if (meaning := self.understand(heading)) is not None]
+        fields: dict[str, Any] = {}
+        for signal in SIGNALS:
+            columns = {heading: m for heading, m in found if m.signal == signal}
+            if columns:
+                fields[signal] = _signal_columns(signal, columns)
+        times = [{"column": heading, "unit": m.unit} for heading, m in found if m.signal is None and m.unit]
+        if times:
+            fields["time"] = times[0]
+        return mappings.Mapping.model_validate(fields)
+
+
+def _units(words_and_units: Mapping[str, Any]) -> list[tuple[str | None, str]]:
+    named = words_and_units["units"].items()
+    return [(None, ""), *((unit, compact(spelling)) for unit, spellings in named for spelling in spellings)]
+
+
+def _stems(word: str, axis: str) -> list[str]:
+    """A quantity with its axis: `ax`, `accelx`, `linear accel x`, `x axis linear accel`."""
+    if len(word) < 3:
+        return [f"{word}{axis}"]
+    return [f"{word}{axis}", f"{axis}{word}", f"{axis}axis{word}", f"{word}{axis}axis"]
+
+
+def _signal_columns(signal: SignalName, columns: Mapping[str, Meaning]) -> dict[str, Any]:
+    """The columns of one signal, all three in one unit."""
+    by_axis: dict[str, list[str]] = {}
+    for heading, meaning in columns.items():
+        by_axis.setdefault(str(meaning.axis), []).append(heading)
+    if any(len(headings) > 1 for headings in by_axis.values()):
+        raise layout_problem(
+            f"Several columns could be the same component of the {signal}: say in a mapping which to take.",
+            code="heading-twice",
+            pointer=f"/{signal}",
+        )
+    units = {meaning.unit for meaning in columns.values()}
+    if len(units) > 1:
+        raise layout_problem(
+            f"The columns of the {signal} must be in one unit.", code="units-differ", pointer=f"/{signal}/unit"
+        )
+    return {"unit": units.pop(), **by_axis}

@@ -1,0 +1,127 @@
+"""A mapping: which column of a table is which component of which signal, in which unit.
+
+Presets are mappings kept as files; a request may bring one of its own, or correct a preset's in part. Nothing is
+guessed: a signal whose unit is in no heading, preset or mapping is refused.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from headimpact.recording import SIGNALS, SignalName
+from headimpact_service.ingest.impact_json import (
+    MAX_RATE_HZ,
+    MIN_RATE_HZ,
+    Axes,
+    Filter,
+    Location,
+    MountingBody,
+    Plane,
+    Strict,
+)
+
+MAX_SPELLINGS = 20
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+"""Units of a time column, in seconds."""
+
+
+def _as_list(value: Any) -> Any:  # noqa: ANN401 - validated after
+    """One alternative may be written without its list."""
+    return value if isinstance(value, list) else [value]
+
+
+Heading = Annotated[str, Field(min_length=1, max_length=200)]
+Spellings = Annotated[list[Heading], Field(min_length=1, max_length=MAX_SPELLINGS), BeforeValidator(_as_list)]
+
+
+class SignalColumns(Strict):
+    """The columns of one signal; a `-` before a heading turns the component's sign."""
+
+    unit: str | None = None
+    x: Spellings | None = None
+    y: Spellings | None = None
+    z: Spellings | None = None
+
+
+class LinearAccelerationColumns(SignalColumns):
+    """Columns of linear acceleration."""
+
+    unit: Literal["g", "m/s^2"] | None = None
+
+
+class AngularVelocityColumns(SignalColumns):
+    """Columns of angular velocity."""
+
+    unit: Literal["rad/s", "deg/s"] | None = None
+
+
+class AngularAccelerationColumns(SignalColumns):
+    """Columns of angular acceleration."""
+
+    unit: Literal["rad/s^2", "deg/s^2"] | None = None
+
+
+class TimeColumn(Strict):
+    """A column of stamps."""
+
+    column: Heading
+    unit: Literal["s", "ms", "us"]
+
+
+Times = Annotated[list[TimeColumn], Field(min_length=1, max_length=MAX_SPELLINGS), BeforeValidator(_as_list)]
+
+
+class DateAndTime(Strict):
+    """An instant that is spread over two columns: an ISO date and a time of day."""
+
+    date: Spellings
+    time: Spellings
+
+
+class Mapping(Strict):
+    """How a table is read. Every field is optional: a request's mapping may complete or correct a preset's.
+
+    `zero` says what the stamps count from: `record_start` (their first is the record's start), `trigger` (time zero is
+    the trigger). Left out, stamps that run from before zero to after it count from the trigger, others from the start.
+    """
+
+    linear_acceleration: LinearAccelerationColumns | None = None
+    angular_velocity: AngularVelocityColumns | None = None
+    angular_acceleration: AngularAccelerationColumns | None = None
+    time: Times | None = None
+    zero: Literal["record_start", "trigger"] | None = None
+    sample_rate_hz: float | None = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
+    pre_trigger_ms: float | None = Field(None, ge=0.0, le=60_000.0)
+    group_by: Annotated[list[Spellings], Field(max_length=8), BeforeValidator(_as_list)] | None = None
+    external_id: Spellings | None = None
+    athlete: Spellings | None = None
+    device: Spellings | None = None
+    session_id: Spellings | None = None
+    occurred_at: Spellings | DateAndTime | None = None
+    axes: Axes | None = None
+    location: Location | None = None
+    mounting: MountingBody | None = None
+    constrained_plane: Plane | None = None
+    filter: Filter | None = None
+    skip_rows: int | None = Field(None, ge=0, le=1000, description="Lines above the headings.")
+    drop_rows: int | None = Field(None, ge=0, le=1000, description="Samples to drop at the start of each impact.")
+
+    def columns_of(self, signal: SignalName) -> SignalColumns | None:
+        """The columns of one signal."""
+        columns: SignalColumns | None = getattr(self, signal)
+        return columns
+
+
+def merge(base: Mapping, over: Mapping | None) -> Mapping:
+    """`base` with everything that `over` gives put in its place; within a signal, field by field."""
+    if over is None:
+        return base
+    given: dict[str, Any] = {name: getattr(over, name) for name in over.model_fields_set}
+    for signal in SIGNALS:
+        below, above = base.columns_of(signal), over.columns_of(signal)
+        if below is not None and above is not None:
+            fields = {name: getattr(above, name) for name in above.model_fields_set}
+            given[signal] = below.model_copy(update=fields)
+    return base.model_copy(update=given)

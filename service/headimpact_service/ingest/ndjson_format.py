@@ -1,0 +1,61 @@
+"""NDJSON: one impact a line. A bad line is that line's problem, not the file's."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterator
+
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.impact_json import FileImpactBody
+from headimpact_service.ingest.impact_reading import to_record
+from headimpact_service.ingest.json_faults import parse
+from headimpact_service.ingest.json_format import refuse_table_options
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.overrides import with_options
+from headimpact_service.ingest.record import ImpactRecord
+
+MAX_LINE = 8 * 1024 * 1024
+"""As a JSON body: a line holds one impact."""
+
+
+def read_ndjson(data: bytes, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+    """The impacts of an NDJSON file; empty lines are passed over."""
+    refuse_table_options(options, "NDJSON")
+    count = 0
+    for number, line in _lines(data):
+        count += 1
+        if count > options.max_impacts:
+            raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
+        try:
+            yield _read_line(line, number, options)
+        except Problem as problem:
+            yield problem
+    if count == 0:
+        raise Problem("unreadable-file", "The file holds no impact.")
+
+
+def _read_line(line: bytes, number: int, options: ImportOptions) -> ImpactRecord:
+    what = f"impact in line {number}"
+    if len(line) > MAX_LINE:
+        raise Problem("unreadable-file", f"The {what} may have at most {MAX_LINE} bytes.")
+    try:
+        body = parse(line, FileImpactBody, what=what)
+    except Problem as problem:
+        if problem.slug == "malformed-request":
+            raise Problem("unreadable-file", problem.detail) from None
+        raise
+    return with_options(to_record(body, time_zone=options.time_zone, what=what), options)
+
+
+def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """The lines that are not empty, with their numbers, without splitting the whole file at once."""
+    start = len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0
+    number = 0
+    while start < len(data):
+        number += 1
+        stop = data.find(b"\n", start)
+        stop = len(data) if stop < 0 else stop
+        line = data[start:stop].strip()
+        if line:
+            yield number, line
+        start = stop + 1

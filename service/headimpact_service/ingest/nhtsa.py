@@ -1,0 +1,231 @@
+"""NHTSA crash tests: a zip of curves (``.001``, ``.002``, …) and the EV5 file that says what they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from headimpact.filtering import PAPER
+from headimpact.quality import QualityNote
+from headimpact.recording import AXES, SIGNALS, Recording, Signal, SignalName
+from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest.impact_json import MAX_SAMPLES
+from headimpact_service.ingest.impact_reading import low_pass
+from headimpact_service.ingest.nhtsa_header import Channel, CrashTest, Occupant, read_header
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.overrides import with_options
+from headimpact_service.ingest.presets import preset_named
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.stamps import nominal_rate
+from headimpact_service.ingest.table import FloatArray
+from headimpact_service.ingest.zip_guard import GuardedZip
+
+PRESET = "nhtsa"
+_CURVE = re.compile(r"\.([0-9]{3,4})$")
+_NUMBERS = re.compile(rb"[0-9eE+.\s-]*")
+MAX_CURVE = 4 * 1024 * 1024
+
+
+def is_nhtsa(names: list[str]) -> bool:
+    """Whether an archive's files are those of a crash test."""
+    return any(name.lower().endswith(".ev5") for name in names)
+
+
+def read_nhtsa(archive: GuardedZip, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+    """The head impacts of the crash tests in an archive: one for each occupant whose head has channels."""
+    if options.mapping is not None or options.preset not in {None, PRESET}:
+        raise Problem("unreadable-file", "A crash test is read by the preset nhtsa and takes no mapping.")
+    found = 0
+    for header in sorted(name for name in archive.names if name.lower().endswith(".ev5")):
+        test = read_header(archive.read(header))
+        curves = _curves(archive.names, header)
+        for occupant in sorted({channel.occupant for channel in test.channels}):
+            found += 1
+            if found > options.max_impacts:
+                raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
+            try:
+                yield with_options(_Head(archive, curves, test, occupant).record(), options)
+            except Problem as problem:
+                yield problem
+    if not found:
+        raise Problem("unreadable-file", "The crash test has no channel at a head's centre of gravity (HDCG).")
+
+
+def _curves(names: list[str], header: str) -> dict[int, str]:
+    """The curve files beside an EV5 file, by number; of several tests in one folder, those of its own name."""
+    folder = PurePosixPath(header).parent
+    beside = [PurePosixPath(name) for name in names if PurePosixPath(name).parent == folder]
+    curves = [(path, int(found[1])) for path in beside if (found := _CURVE.search(path.name)) is not None]
+    stems = {path.stem.lower() for path, _ in curves}
+    if len(stems) > 1:
+        own = PurePosixPath(header).stem.lower()
+        curves = [(path, number) for path, number in curves if path.stem.lower() == own]
+    return {number: str(path) for path, number in curves}
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """One channel's samples; `start_s` is the first one's time from the event."""
+
+    channel: Channel
+    values: FloatArray
+    stamps_s: FloatArray
+    rate: float
+
+
+class _Head:
+    """One occupant's head in one test."""
+
+    def __init__(self, archive: GuardedZip, curves: dict[int, str], test: CrashTest, occupant: Occupant) -> None:
+        self.archive, self.curves, self.test, self.occupant = archive, curves, test, occupant
+        self.notes: list[QualityNote] = []
+        self.unscorable: list[str] = []
+        self.read: list[Channel] = []
+
+    def record(self) -> ImpactRecord:
+        """The head's record, in the laboratory's axes and unfiltered unless the sender asks otherwise."""
+        signals = {name: curves for name in SIGNALS if (curves := self._curves_of(self._channels(name)))}
+        if not signals:
+            raise _fault("No head channel of this occupant has its three curves in the archive.", "no-signal")
+        mapping = preset_named(PRESET).mapping
+        start_s = min(float(curve.stamps_s[0]) for curves in signals.values() for curve in curves)
+        recording = Recording(
+            axes=mapping.axes or "anatomical",
+            low_pass=PAPER if mapping.filter is None else low_pass(mapping.filter),
+            pre_trigger_ms=round(-1000.0 * start_s, 9) if start_s <= 0.0 else None,
+            **self._signals(signals),
+        )
+        return ImpactRecord(
+            recording=recording,
+            metadata=self._metadata(),
+            notes=tuple(self.notes),
+            unscorable=tuple(self.unscorable),
+        )
+
+    def _channels(self, signal: SignalName) -> list[Channel]:
+        """One channel for each axis: a valid one before an invalid, the primary before a redundant sensor."""
+        mine = [c for c in self.test.channels if c.occupant == self.occupant and c.signal == signal]
+        best: dict[str, Channel] = {}
+        for channel in sorted(mine, key=lambda c: (not c.valid, not c.primary, c.curve)):
+            best.setdefault(channel.axis, channel)
+        return [best[axis] for axis in AXES if axis in best]
+
+    def _curves_of(self, channels: list[Channel]) -> list[_Curve]:
+        """The signal's three curves, or none where one is absent; what its laboratory marked invalid is held."""
+        for channel in channels:
+            if not channel.valid:
+                reason = f"Its laboratory marked {channel.named} as not valid (status {channel.status})."
+                self.unscorable.append(reason)
+        absent = [channel for channel in channels if channel.curve not in self.curves]
+        for channel in absent:
+            self._note("channel_missing", f"The file of {channel.named} is not in the archive.", channel)
+        if absent or len(channels) < len(AXES):
+            return []
+        self.read += channels
+        return [self._curve(channel) for channel in channels]
+
+    def _curve(self, channel: Channel) -> _Curve:
+        data = self.archive.read(self.curves[channel.curve])
+        stamps, values = _columns(data, channel)
+        if channel.points is not None and channel.points != values.size:
+            detail = f"The file of {channel.named} has {values.size} samples where its EV5 row says {channel.points}."
+            self._note("sample_count_mismatch", detail, channel)
+        rate = nominal_rate(stamps)
+        if rate is None:
+            raise _fault(f"The times of {channel.named} must increase in equal steps.", "time-not-increasing")
+        if channel.unit is None:
+            raise _fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
+        return _Curve(channel, values, stamps, rate)
+
+    def _signals(self, curves: dict[SignalName, list[_Curve]]) -> dict[str, Any]:
+        """The signals on rates, if all curves are sampled alike; else on their own stamps, on one clock."""
+        every = [curve for three in curves.values() for curve in three]
+        if any(curve.rate != every[0].rate for curve in every):
+            return {name: _stamped(_common(three)) for name, three in curves.items()}
+        common = _common(every)
+        cut = {id(before): after for before, after in zip(every, common, strict=True)}
+        return {name: _stated([cut[id(curve)] for curve in three]) for name, three in curves.items()}
+
+    def _note(self, code: str, detail: str, channel: Channel) -> None:
+        self.notes.append(QualityNote(code, "warning", detail, channel.signal, channel.axis))
+
+    def _metadata(self) -> dict[str, Any]:
+        metadata: dict[str, Any] = {
+            "format": "nhtsa",
+            "preset": PRESET,
+            "vehicle": self.occupant.vehicle,
+            "occupant": self.occupant.seat,
+            "curves": {f"{c.signal}_{c.axis}": c.curve for c in self.read},
+        }
+        if self.test.number is not None:
+            metadata["test_number"] = self.test.number
+        if self.occupant in self.test.laboratory:
+            metadata["laboratory"] = self.test.laboratory[self.occupant]
+        return metadata
+
+
+def _columns(data: bytes, channel: Channel) -> tuple[FloatArray, FloatArray]:
+    """Stamps and values: two numbers a line."""
+    if len(data) > MAX_CURVE or _NUMBERS.fullmatch(data) is None:
+        raise _fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
+    try:
+        numbers = np.array(list(map(float, data.split())), dtype=np.float64)
+    except ValueError:
+        raise _fault(f"The file of {channel.named} holds what is no number.", "missing-sample") from None
+    if numbers.size % 2 or not np.isfinite(numbers).all():
+        raise _fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
+    if not 6 <= numbers.size <= 2 * MAX_SAMPLES:
+        raise _fault(f"The file of {channel.named} must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
+    return numbers[0::2].copy(), numbers[1::2].copy()
+
+
+def _common(curves: list[_Curve]) -> list[_Curve]:
+    """Curves of one rate cut to the samples that all of them have."""
+    rate = curves[0].rate
+    if any(curve.rate != rate for curve in curves):
+        raise _fault("The three curves of a signal must be sampled at one rate.", "rates-differ")
+    start = max(float(curve.stamps_s[0]) for curve in curves)
+    offsets = [round((start - float(curve.stamps_s[0])) * rate) for curve in curves]
+    count = min(curve.values.size - offset for curve, offset in zip(curves, offsets, strict=True))
+    if count < 3:
+        raise _fault("The head's curves must overlap in time by at least 3 samples.", "no-overlap")
+    return [
+        _Curve(c.channel, c.values[o : o + count], c.stamps_s[o : o + count], rate)
+        for c, o in zip(curves, offsets, strict=True)
+    ]
+
+
+def _stated(curves: list[_Curve]) -> Signal:
+    rate = curves[0].rate
+    return Signal(values=_values(curves), unit=_unit(curves), sample_rate_hz=rate, declared_range=_range(curves))
+
+
+def _stamped(curves: list[_Curve]) -> Signal:
+    stamps = curves[0].stamps_s
+    return Signal(values=_values(curves), unit=_unit(curves), time_s=stamps, declared_range=_range(curves))
+
+
+def _values(curves: list[_Curve]) -> FloatArray:
+    return np.ascontiguousarray(np.stack([curve.values for curve in curves], axis=1))
+
+
+def _unit(curves: list[_Curve]) -> str:
+    units = {str(curve.channel.unit) for curve in curves}
+    if len(units) > 1:
+        raise _fault("The three curves of a signal must be in one unit.", "units-differ")
+    return units.pop()
+
+
+def _range(curves: list[_Curve]) -> float | None:
+    """The sensors' full scale, where all three have one: their largest, so that no smaller one raises a false alarm."""
+    scales = [curve.channel.full_scale for curve in curves]
+    return max(scale for scale in scales if scale is not None) if all(scales) else None
+
+
+def _fault(detail: str, code: str) -> Problem:
+    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code=code)])

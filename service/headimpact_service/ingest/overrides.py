@@ -1,0 +1,39 @@
+"""What the sender gives beside a file, put in place of what the file says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from headimpact.recording import Recording, Signal
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.record import ImpactRecord
+
+
+def with_options(record: ImpactRecord, options: ImportOptions) -> ImpactRecord:
+    """The record as the sender's fields have it."""
+    changes: dict[str, Any] = {"recording": _recording(record.recording, options)}
+    if options.athlete is not None:
+        changes |= {"athlete_id": None, "athlete_external_id": options.athlete}
+    if options.device is not None:
+        changes["device_serial"] = options.device
+    if options.occurred_at is not None:
+        changes["occurred_at"] = options.occurred_at
+    if options.filename is not None:
+        changes["metadata"] = {**record.metadata, "file": options.filename}
+    return replace(record, **changes)
+
+
+def _recording(recording: Recording, options: ImportOptions) -> Recording:
+    changes: dict[str, Any] = {}
+    if options.axes is not None:
+        changes["axes"] = options.axes
+    if options.low_pass is not None:
+        changes["low_pass"] = options.low_pass
+    if options.sample_rate_hz is not None:
+        changes |= {name: _at_rate(signal, options.sample_rate_hz) for name, signal in recording.signals()}
+    return replace(recording, **changes) if changes else recording
+
+
+def _at_rate(signal: Signal, sample_rate_hz: float) -> Signal:
+    return replace(signal, sample_rate_hz=sample_rate_hz, time_s=None)

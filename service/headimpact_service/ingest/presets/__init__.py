@@ -1,0 +1,142 @@
+"""The layouts of known devices, one file each: adding a device needs no code."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from headimpact.recording import AXES, SIGNALS
+from headimpact_service.errors import invalid_parameter
+from headimpact_service.ingest.headings import Headings, Vocabulary
+from headimpact_service.ingest.impact_json import FilterBody, Strict
+from headimpact_service.ingest.mapping import DateAndTime, Mapping, SignalColumns
+
+Requirement = Literal["sample_rate_hz", "units", "occurred_at"]
+
+
+class Preset(Strict):
+    """One device's layout, as its file has it.
+
+    `recognised` says that a table with these headings is this device's without anyone naming the preset; that needs
+    headings which name their units or are the device's alone. `requires` is what the layout cannot say and the sender
+    must.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
+    title: str
+    source: str
+    format: Literal["table", "nhtsa"] = "table"
+    recognised: bool = False
+    requires: list[Requirement] = Field(default_factory=list)
+    notes: list[str] = Field(default_factory=list)
+    mapping: Mapping
+    vocabulary: dict[str, Any] | None = None
+
+    def mapping_for(self, headings: Sequence[str]) -> Mapping:
+        """The preset's mapping, completed by what the headings say where its vocabulary reads them."""
+        if self.vocabulary is None:
+            return self.mapping
+        spoken = _vocabulary(self.name).mapping(headings)
+        return spoken.model_copy(update={name: getattr(self.mapping, name) for name in self.mapping.model_fields_set})
+
+    def fits(self, headings: Headings) -> bool:
+        """Whether a table with these headings is of this layout: every signal's columns are there."""
+        mapping = self.mapping_for(headings.written)
+        signals = [columns for name in SIGNALS if (columns := mapping.columns_of(name)) is not None]
+        return bool(signals) and all(_is_there(columns, headings) for columns in signals)
+
+
+@cache
+def _vocabulary(name: str) -> Vocabulary:
+    return Vocabulary(presets()[name].vocabulary or {})
+
+
+def _is_there(columns: SignalColumns, headings: Headings) -> bool:
+    spellings = [getattr(columns, axis) for axis in AXES]
+    return all(names is not None and headings.find(names) is not None for names in spellings)
+
+
+@cache
+def presets() -> dict[str, Preset]:
+    """Every preset by its name; those of one device before the generic ones, which fit more."""
+    folder = files(__name__)
+    texts = (entry.read_text("utf-8") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    read = [Preset.model_validate(tomllib.loads(text)) for text in texts]
+    return {preset.name: preset for preset in sorted(read, key=lambda p: (p.vocabulary is not None, p.name))}
+
+
+def preset_named(name: str) -> Preset:
+    """The preset of that name; 422 if there is none."""
+    preset = presets().get(name)
+    if preset is None:
+        known = ", ".join(presets())
+        raise invalid_parameter("preset", f"There is no such preset; the presets are {known}.", "not-allowed")
+    return preset
+
+
+def recognise(headings: Headings) -> Preset | None:
+    """The preset that a table's headings are of."""
+    candidates = (preset for preset in presets().values() if preset.recognised and preset.format == "table")
+    return next((preset for preset in candidates if preset.fits(headings)), None)
+
+
+def list_presets() -> list[dict[str, Any]]:
+    """The presets as ``GET /v1/presets`` shows them: columns, units, axes, and what the sender must add."""
+    return [_shown(preset) for preset in presets().values()]
+
+
+def _shown(preset: Preset) -> dict[str, Any]:
+    mapping = preset.mapping
+    return {
+        "name": preset.name,
+        "title": preset.title,
+        "source": preset.source,
+        "format": preset.format,
+        "recognised": preset.recognised,
+        "requires": list(preset.requires),
+        "axes": mapping.axes or "anatomical",
+        "location": mapping.location or "head_cg",
+        "filter": _filter_shown(mapping),
+        "sample_rate_hz": mapping.sample_rate_hz,
+        "pre_trigger_ms": mapping.pre_trigger_ms,
+        "time": [time.model_dump() for time in mapping.time or ()],
+        "group_by": list(mapping.group_by or ()),
+        "columns": _columns_shown(preset),
+        "notes": list(preset.notes),
+    }
+
+
+def _filter_shown(mapping: Mapping) -> Any:  # noqa: ANN401 - as in an impact: a name or an object
+    choice = mapping.filter or "paper"
+    return choice.model_dump() if isinstance(choice, FilterBody) else choice
+
+
+def _columns_shown(preset: Preset) -> list[dict[str, Any]]:
+    columns = [
+        {"signal": signal, "axis": axis, "unit": signal_columns.unit, "headings": getattr(signal_columns, axis)}
+        for signal in SIGNALS
+        if (signal_columns := preset.mapping.columns_of(signal)) is not None
+        for axis in AXES
+    ]
+    if preset.vocabulary is not None:
+        columns += [_vocabulary_shown(signal, preset.vocabulary[signal]) for signal in SIGNALS]
+    return columns + _labels_shown(preset.mapping)
+
+
+def _vocabulary_shown(signal: str, words: dict[str, Any]) -> dict[str, Any]:
+    """What a generic preset takes: any of the words with an axis and one of the unit's spellings."""
+    return {"signal": signal, "axis": None, "unit": None, "words": words["words"], "units": words["units"]}
+
+
+def _labels_shown(mapping: Mapping) -> list[dict[str, Any]]:
+    labels: list[dict[str, Any]] = []
+    for name in ("external_id", "athlete", "device", "session_id", "occurred_at"):
+        spellings = getattr(mapping, name)
+        parts = [spellings.date, spellings.time] if isinstance(spellings, DateAndTime) else [spellings]
+        labels += [{"field": name, "headings": part} for part in parts if part is not None]
+    return labels

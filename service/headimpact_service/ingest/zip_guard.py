@@ -1,0 +1,109 @@
+"""Zip archives from strangers: refused by their directory before anything inflates, and read under a budget.
+
+Nothing is ever written to disk, so a path cannot lead out of a folder; paths that try are refused all the same, as are
+links, encrypted entries and any method but stored and deflated.
+"""
+
+from __future__ import annotations
+
+import io
+import stat
+import struct
+import zipfile
+import zlib
+from pathlib import PurePosixPath
+
+from headimpact_service.errors import Problem
+
+MAX_ENTRIES = 4096
+MAX_DIRECTORY = 2 * 1024 * 1024
+MAX_ENTRY = 64 * 1024 * 1024
+MAX_TOTAL = 1024 * 1024 * 1024
+MAX_READ = 256 * 1024 * 1024
+MAX_RATIO = 200
+RATIO_FROM = 1024 * 1024
+"""Bytes: a smaller entry may be as repetitive as it likes."""
+
+_END = b"PK\x05\x06"
+_END_SIZE = 22
+_METHODS = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
+
+
+class GuardedZip:
+    """An archive whose directory keeps to the bounds; :meth:`read` keeps to them as well."""
+
+    def __init__(self, data: bytes) -> None:
+        """Read and judge the directory.
+
+        Raises
+        ------
+        Problem
+            422 for an archive that is broken or breaks a bound.
+        """
+        _require_small_directory(data)
+        try:
+            self._archive = zipfile.ZipFile(io.BytesIO(data))
+            entries = self._archive.infolist()
+        except (zipfile.BadZipFile, ValueError, struct.error, NotImplementedError, EOFError, OverflowError):
+            raise _unreadable("The zip archive is broken.") from None
+        if len(entries) > MAX_ENTRIES:
+            raise _unreadable(f"A zip archive may have at most {MAX_ENTRIES} entries.")
+        for entry in entries:
+            _require_harmless(entry)
+        if sum(entry.file_size for entry in entries) > MAX_TOTAL:
+            raise _unreadable(f"A zip archive may inflate to at most {MAX_TOTAL} bytes.")
+        self._entries = {entry.filename: entry for entry in entries if not entry.is_dir()}
+        if len(self._entries) != sum(not entry.is_dir() for entry in entries):
+            raise _unreadable("A zip archive holds each name once.")
+        self._budget = MAX_READ
+
+    @property
+    def names(self) -> list[str]:
+        """The files' paths in the archive, in its order."""
+        return list(self._entries)
+
+    def read(self, name: str) -> bytes:
+        """One file, inflated; 422 where it is broken or the archive's budget is spent."""
+        entry = self._entries[name]
+        self._budget -= entry.file_size
+        if self._budget < 0:
+            raise _unreadable(f"At most {MAX_READ} bytes are read from one zip archive.")
+        try:
+            # zipfile stops at the declared size, which the guard has bounded.
+            return self._archive.read(entry)
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, struct.error, OSError):
+            raise _unreadable("A file of the zip archive is broken.") from None
+
+
+def _require_small_directory(data: bytes) -> None:
+    """Judge the archive's last record, so that a directory of a million entries is never parsed."""
+    place = data.rfind(_END, max(0, len(data) - _END_SIZE - 0xFFFF))
+    if place < 0 or len(data) - place < _END_SIZE:
+        raise _unreadable("The zip archive is broken: it has no end.")
+    entries, size = struct.unpack_from("<HI", data, place + 10)
+    if entries > MAX_ENTRIES or size > MAX_DIRECTORY:
+        raise _unreadable(f"A zip archive may have at most {MAX_ENTRIES} entries.")
+
+
+def _require_harmless(entry: zipfile.ZipInfo) -> None:
+    if entry.flag_bits & 0x1:
+        raise _unreadable("Encrypted zip archives are not read.")
+    if entry.compress_type not in _METHODS:
+        raise _unreadable("A zip archive's files are stored or deflated; other methods are not read.")
+    if stat.S_ISLNK(entry.external_attr >> 16):
+        raise _unreadable("A zip archive may hold no links.")
+    if _leads_out(entry.orig_filename):
+        raise _unreadable("A path in the zip archive leads out of it.")
+    if entry.file_size > MAX_ENTRY:
+        raise _unreadable(f"A file in a zip archive may inflate to at most {MAX_ENTRY} bytes.")
+    if entry.file_size > RATIO_FROM and entry.file_size > MAX_RATIO * max(entry.compress_size, 1):
+        raise _unreadable(f"A file in a zip archive may inflate to at most {MAX_RATIO} times its size.")
+
+
+def _leads_out(path: str) -> bool:
+    plain = path.replace("\\", "/")
+    return plain.startswith("/") or "\0" in path or ":" in plain or ".." in PurePosixPath(plain).parts
+
+
+def _unreadable(detail: str) -> Problem:
+    return Problem("unreadable-file", detail)
