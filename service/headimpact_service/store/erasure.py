@@ -6,21 +6,24 @@ from sqlalchemy import Connection, bindparam, delete, select, update
 
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
-from headimpact_service.store.tables import impact_revisions, impacts, scores, traces
+from headimpact_service.store.tables import impact_revisions, impacts, scores
 
 _NOTHING = {
     column.name: None
     for column in impacts.c
     if column.name not in {"id", "data_set_id", "external_id", "external_id_digest", "athlete_id"} and column.nullable
 }
-_ENTOMB = update(impacts).where(impacts.c.id == bindparam("impact_id"))
-_CONTENTS = [
-    delete(table).where(table.c.impact_id == bindparam("impact")) for table in (traces, scores, impact_revisions)
-]
+_ENTOMB = update(impacts).where(
+    impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact_id")
+)
+_CONTENTS = [delete(table).where(table.c.impact_id == bindparam("impact")) for table in (scores, impact_revisions)]
 _REVISION = [
     delete(table).where(table.c.impact_id == bindparam("impact"), table.c.revision == bindparam("number_of_revision"))
-    for table in (traces, scores, impact_revisions)
+    for table in (scores, impact_revisions)
 ]
+_MOVED = select(impact_revisions.c.impact_id, impact_revisions.c.revision).where(
+    impact_revisions.c.athlete_id == bindparam("athlete_id"), impact_revisions.c.superseded_at.is_not(None)
+)
 
 
 def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes], *, external_ids: bool) -> None:
@@ -38,7 +41,9 @@ def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes],
     tombs = []
     for number, impact_id in enumerate(impact_ids):
         now = first + number * MICROSECOND
-        tombs.append(nothing | {"impact_id": impact_id, "updated_at": now, "deleted_at": now})
+        tombs.append(
+            nothing | {"of_data_set": data_set_id, "impact_id": impact_id, "updated_at": now, "deleted_at": now}
+        )
     conn.execute(_ENTOMB.values(revision=impacts.c.revision + 1), tombs)
 
 
@@ -49,10 +54,7 @@ def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: byt
     erase_impacts(conn, data_set_id, list(known), external_ids=True)
     # Those deleted one by one before kept their external ids.
     conn.execute(update(impacts).where(impacts.c.athlete_id == athlete_id).values(external_id=None))
-    revisions = impact_revisions.c
-    moved = conn.execute(
-        select(revisions.impact_id, revisions.revision).where(revisions.athlete_id == athlete_id)
-    ).all()
+    moved = conn.execute(_MOVED, {"athlete_id": athlete_id}).all()
     if moved:
         for statement in _REVISION:
             conn.execute(statement, [{"impact": impact, "number_of_revision": number} for impact, number in moved])

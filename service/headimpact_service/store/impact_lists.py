@@ -8,9 +8,10 @@ from typing import Any
 
 from sqlalchemy import BindParameter, ColumnElement, Connection, Select, bindparam, or_, select
 
-from headimpact_service.store.impact_rows import IMPACT, Impact, Revision, external_id_digest, impact_of
+from headimpact_service.store.impact_rows import IMPACT, OF_REVISION, Impact, Revision, external_id_digest, impact_of
 from headimpact_service.store.paging import Page, Position, keyset, page_of
-from headimpact_service.store.tables import devices, impact_revisions, impacts, scores, traces
+from headimpact_service.store.prepared import Prepared
+from headimpact_service.store.tables import devices, impact_revisions, impacts, scores
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +40,7 @@ class Trace:
 
 
 _DATA_SET: BindParameter[bytes] = bindparam("data_set_id")
-_BY_ID = IMPACT.where(impacts.c.id == bindparam("impact_id"))
+_BY_ID = Prepared(IMPACT.where(impacts.c.id == bindparam("impact_id")))
 _REVISIONS = (
     select(
         impact_revisions.c.revision,
@@ -49,18 +50,19 @@ _REVISIONS = (
         impact_revisions.c.document,
         impact_revisions.c.key_id,
         impact_revisions.c.created_at,
+        impact_revisions.c.superseded_at,
     )
-    .join(impacts, impacts.c.id == impact_revisions.c.impact_id)
+    .join(impacts, OF_REVISION)
     .where(impacts.c.data_set_id == _DATA_SET, impacts.c.id == bindparam("impact_id"))
     .order_by(impact_revisions.c.revision)
 )
 _TRACE = (
-    select(traces.c.revision, traces.c.signals)
-    .join(impacts, impacts.c.id == traces.c.impact_id)
+    select(impact_revisions.c.revision, impact_revisions.c.trace)
+    .join(impacts, OF_REVISION)
     .where(impacts.c.data_set_id == _DATA_SET, impacts.c.id == bindparam("impact_id"))
 )
-_PRESENT_TRACE = _TRACE.where(traces.c.revision == impacts.c.revision)
-_KEPT_TRACE = _TRACE.where(traces.c.revision == bindparam("revision"))
+_PRESENT_TRACE = _TRACE.where(impact_revisions.c.revision == impacts.c.revision)
+_KEPT_TRACE = _TRACE.where(impact_revisions.c.revision == bindparam("revision"))
 _SAME_CONTENT = (
     select(impacts.c.id)
     .where(impacts.c.data_set_id == _DATA_SET, impacts.c.input_digest == bindparam("input_digest"))
@@ -78,7 +80,7 @@ def get(conn: Connection, data_set_id: bytes, impact_id: bytes) -> Impact | None
 
 def get_any(conn: Connection, data_set_id: bytes, impact_id: bytes) -> Impact | None:
     """An impact or its tombstone."""
-    row = conn.execute(_BY_ID, {"data_set_id": data_set_id, "impact_id": impact_id}).first()
+    row = _BY_ID.first(conn, {"data_set_id": data_set_id, "impact_id": impact_id})
     return None if row is None else impact_of(row)
 
 

@@ -79,6 +79,7 @@ class Revision:
     document: Mapping[str, Any]
     key_id: bytes | None
     created_at: datetime
+    superseded_at: datetime | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +111,8 @@ _NAMES = (
     impacts.c.deleted_at,
     impact_revisions.c.document,
 )
+OF_REVISION = impacts.c.id == impact_revisions.c.impact_id
+"""Joins an impact and its revisions."""
 _KEYS = [column.key for column in _NAMES]
 _FIRST_SCORE = len(_NAMES)
 _STATE = _FIRST_SCORE + [column.name for column in score_rows.COLUMNS].index("state")
@@ -121,7 +124,7 @@ IMPACT = (
     .outerjoin(devices, devices.c.id == impacts.c.device_id)
     .outerjoin(
         impact_revisions,
-        and_(impact_revisions.c.impact_id == impacts.c.id, impact_revisions.c.revision == impacts.c.revision),
+        and_(OF_REVISION, impact_revisions.c.revision == impacts.c.revision),
     )
     .outerjoin(scores, and_(scores.c.impact_id == impacts.c.id, scores.c.number == impacts.c.score_number))
     .where(impacts.c.data_set_id == bindparam("data_set_id"))

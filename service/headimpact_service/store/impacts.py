@@ -26,10 +26,11 @@ from headimpact_service.store.impact_lists import (
     trace,
 )
 from headimpact_service.store.impact_rows import Impact, NewImpact, Outcome, Revision, external_id_digest
+from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.revision import require_revision
 from headimpact_service.store.score_rows import row_of, stored
 from headimpact_service.store.scores import next_number
-from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts, scores, traces
+from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts, scores
 
 __all__ = [
     "Impact",
@@ -69,24 +70,26 @@ _ATHLETE_BY_ID = (
     athletes.c.data_set_id == _DATA_SET,
     athletes.c.deleted_at.is_(None),
 )
-_KNOWN = select(
-    last_change(impacts),
-    select(athletes.c.id)
-    .where(athletes.c.data_set_id == _DATA_SET, athletes.c.external_id == bindparam("athlete_external_id"))
-    .scalar_subquery(),
-    select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),
-    select(athletes.c.external_id).where(*_ATHLETE_BY_ID).scalar_subquery(),
-    select(devices.c.id)
-    .where(devices.c.data_set_id == _DATA_SET, devices.c.serial == bindparam("serial"))
-    .scalar_subquery(),
-    select(impacts.c.id)
-    .where(impacts.c.data_set_id == _DATA_SET, impacts.c.external_id_digest == bindparam("external_id_digest"))
-    .scalar_subquery(),
-    select(impacts.c.id)
-    .where(impacts.c.data_set_id == _DATA_SET, impacts.c.input_digest == bindparam("input_digest"))
-    .order_by(impacts.c.id)
-    .limit(1)
-    .scalar_subquery(),
+_KNOWN = Prepared(
+    select(
+        last_change(impacts),
+        select(athletes.c.id)
+        .where(athletes.c.data_set_id == _DATA_SET, athletes.c.external_id == bindparam("athlete_external_id"))
+        .scalar_subquery(),
+        select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),
+        select(athletes.c.external_id).where(*_ATHLETE_BY_ID).scalar_subquery(),
+        select(devices.c.id)
+        .where(devices.c.data_set_id == _DATA_SET, devices.c.serial == bindparam("serial"))
+        .scalar_subquery(),
+        select(impacts.c.id)
+        .where(impacts.c.data_set_id == _DATA_SET, impacts.c.external_id_digest == bindparam("external_id_digest"))
+        .scalar_subquery(),
+        select(impacts.c.id)
+        .where(impacts.c.data_set_id == _DATA_SET, impacts.c.input_digest == bindparam("input_digest"))
+        .order_by(impacts.c.id)
+        .limit(1)
+        .scalar_subquery(),
+    )
 )
 _SAME_EVENT = select(impacts.c.id).where(
     impacts.c.data_set_id == _DATA_SET,
@@ -94,10 +97,12 @@ _SAME_EVENT = select(impacts.c.id).where(
     impacts.c.athlete_id.is_not_distinct_from(bindparam("athlete_id")),
     impacts.c.occurred_at.is_not_distinct_from(bindparam("occurred_at")),
 )
-_INSERT_IMPACT = insert(impacts)
-_INSERT_REVISION = insert(impact_revisions)
-_INSERT_TRACE = insert(traces)
-_INSERT_SCORE = insert(scores)
+_INSERT_IMPACT = Prepared(insert(impacts), [column.name for column in impacts.c])
+_INSERT_REVISION = Prepared(insert(impact_revisions), [column.name for column in impact_revisions.c])
+_INSERT_SCORE = Prepared(insert(scores), [column.name for column in scores.c])
+_SUPERSEDE = update(impact_revisions).where(
+    impact_revisions.c.impact_id == bindparam("impact"), impact_revisions.c.revision == bindparam("before")
+)
 
 
 def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_unchanged: bool = False) -> Outcome:
@@ -127,7 +132,7 @@ def _look_up(conn: Connection, data_set_id: bytes, new: NewImpact) -> _Known:
         "external_id_digest": external_id_digest(data_set_id, new.external_id),
         "input_digest": new.input_digest,
     }
-    known = _Known(*conn.execute(_KNOWN, parameters).one())
+    known = _Known(*(_KNOWN.first(conn, parameters) or ()))
     if new.athlete_id is not None and known.athlete_by_id is None:
         detail = "There is no athlete with this id."
         raise Problem(
@@ -162,7 +167,7 @@ def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, impact_id:
 
 
 def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact:
-    """Four rows: the impact, its first revision, its trace, its score."""
+    """Three rows: the impact, its first revision with the trace, its score."""
     now = later_than(known.last_change)
     members = _members(conn, data_set_id, new, known) | {
         "id": ids.new(),
@@ -175,7 +180,7 @@ def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known)
     }
     digest = external_id_digest(data_set_id, new.external_id)
     row = members | {"data_set_id": data_set_id, "external_id_digest": digest, "score_number": 1}
-    conn.execute(_INSERT_IMPACT, row)
+    _INSERT_IMPACT.execute(conn, row)
     _insert_revision(conn, new, row, now)
     return Impact(
         **members,
@@ -213,16 +218,18 @@ def _insert_revision(conn: Connection, new: NewImpact, row: dict[str, Any], now:
     kept = {
         "impact_id": impact_id,
         "revision": revision,
+        "data_set_id": row["data_set_id"],
         "athlete_id": row["athlete_id"],
         "content_digest": new.content_digest,
         "input_digest": new.input_digest,
         "document": new.document,
         "key_id": new.key_id,
         "created_at": now,
+        "superseded_at": None,
+        "trace": new.trace,
     }
-    conn.execute(_INSERT_REVISION, kept)
-    conn.execute(_INSERT_TRACE, {"impact_id": impact_id, "revision": revision, "signals": new.trace})
-    conn.execute(_INSERT_SCORE, row_of(new.score, impact_id, row["score_number"], revision, now))
+    _INSERT_REVISION.execute(conn, kept)
+    _INSERT_SCORE.execute(conn, row_of(new.score, impact_id, row["score_number"], revision, now))
 
 
 def correct(
@@ -242,12 +249,15 @@ def correct(
     row = _members(conn, data_set_id, new, known) | _name(data_set_id, present, new, known)
     now = next_change(conn, impacts, data_set_id)
     row |= {
+        "data_set_id": data_set_id,
         "id": impact_id,
         "revision": present.revision + 1,
         "score_number": next_number(conn, impact_id),
         "updated_at": now,
     }
-    conn.execute(update(impacts).where(impacts.c.id == impact_id), row)
+    of_impact = (impacts.c.data_set_id == data_set_id, impacts.c.id == impact_id)
+    conn.execute(update(impacts).where(*of_impact), row)
+    conn.execute(_SUPERSEDE, {"impact": impact_id, "before": present.revision, "superseded_at": now})
     _insert_revision(conn, new, row, now)
     return Outcome("corrected", _require(conn, data_set_id, impact_id))
 

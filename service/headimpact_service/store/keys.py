@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from hashlib import sha256
+from typing import Any
 
-from sqlalchemy import Connection, Row, bindparam, insert, select, update
+from sqlalchemy import Connection, bindparam, insert, select, update
 
 from headimpact_service.errors import not_found
 from headimpact_service.store import ids
 from headimpact_service.store.organisations import Mode, clean_name, ensure, ensure_data_set
+from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.tables import api_keys, data_sets, organisations
 
 RANDOM_BYTES = 32
@@ -44,6 +46,7 @@ class KeyRow:
         return self.revoked_at is None and (self.expires_at is None or now < self.expires_at)
 
 
+_NAMES = [field.name for field in fields(KeyRow)]
 _KEY = (
     select(
         api_keys.c.id,
@@ -64,7 +67,7 @@ _KEY = (
     .join(data_sets, data_sets.c.id == api_keys.c.data_set_id)
     .join(organisations, organisations.c.id == data_sets.c.organisation_id)
 )
-_BY_DIGEST = _KEY.where(api_keys.c.sha256 == bindparam("digest"))
+_BY_DIGEST = Prepared(_KEY.where(api_keys.c.sha256 == bindparam("digest")))
 _BY_ID = _KEY.where(api_keys.c.id == bindparam("key_id"), data_sets.c.organisation_id == bindparam("organisation_id"))
 _OF_ORGANISATION = _KEY.where(data_sets.c.organisation_id == bindparam("organisation_id")).order_by(
     api_keys.c.id.desc()
@@ -105,7 +108,7 @@ def create_key(
 
 def find_key(conn: Connection, key: str | bytes) -> KeyRow | None:
     """The valid key of a plaintext or its digest; None if it is unknown, revoked or expired."""
-    row = conn.execute(_BY_DIGEST, {"digest": key if isinstance(key, bytes) else digest(key)}).first()
+    row = _BY_DIGEST.first(conn, {"digest": key if isinstance(key, bytes) else digest(key)})
     if row is None:
         return None
     found = _key(row)
@@ -138,8 +141,8 @@ def _get(conn: Connection, organisation_id: bytes, key_id: bytes) -> KeyRow:
     return found
 
 
-def _key(row: Row[*tuple[object, ...]]) -> KeyRow:
-    values = row._asdict()
+def _key(row: Sequence[Any]) -> KeyRow:
+    values = dict(zip(_NAMES, row, strict=True))
     values["scopes"] = frozenset(values["scopes"])
     values["operating_points"] = tuple(values["operating_points"])
     return KeyRow(**values)

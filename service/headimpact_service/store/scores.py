@@ -45,7 +45,7 @@ def add(
     if make_current and score.number != present.score_number:
         now = next_change(conn, impacts, data_set_id)
         values = {"score_number": score.number, "updated_at": now}
-        conn.execute(update(impacts).where(impacts.c.id == impact_id), values)
+        conn.execute(update(impacts).where(impacts.c.data_set_id == data_set_id, impacts.c.id == impact_id), values)
     return score, made
 
 

@@ -140,8 +140,9 @@ devices = Table(
 impacts = Table(
     "impacts",
     metadata,
+    # The rows lie in the order of the list: what would be two more indices to write with every impact.
+    Column("data_set_id", ForeignKey("data_sets.id"), primary_key=True),
     Column("id", Identifier, primary_key=True),
-    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False),
     Column("external_id", Text),
     # What is unique is a digest of the external id: it outlives an erasure, so a redelivery cannot undo one.
     Column("external_id_digest", LargeBinary(16)),
@@ -163,32 +164,35 @@ impacts = Table(
     Column("deleted_at", Instant),
     UniqueConstraint("data_set_id", "external_id_digest"),
     Index(None, "data_set_id", "updated_at", "id"),
-    Index(None, "data_set_id", "id"),
-    Index(None, "data_set_id", "input_digest"),
+    Index(None, "data_set_id", "input_digest", "id"),
     Index(None, "athlete_id", "occurred_at", "id"),
-    Index(None, "device_id"),
+    sqlite_with_rowid=False,
 )
 
 impact_revisions = Table(
     "impact_revisions",
     metadata,
-    Column("impact_id", ForeignKey("impacts.id"), primary_key=True),
+    Column("impact_id", Identifier, primary_key=True),
     Column("revision", Integer, primary_key=True, autoincrement=False),
-    Column("athlete_id", ForeignKey("athletes.id"), index=True),
+    Column("data_set_id", Identifier, nullable=False),
+    Column("athlete_id", ForeignKey("athletes.id")),
     Column("content_digest", Digest, nullable=False),
     Column("input_digest", Digest, nullable=False),
     Column("document", Document, nullable=False),
     Column("key_id", ForeignKey("api_keys.id")),
     Column("created_at", Instant, nullable=False),
+    Column("superseded_at", Instant),
+    # Last, so that reading the rest does not touch the pages that it overflows to.
+    Column("trace", LargeBinary, nullable=False),
+    ForeignKeyConstraint(["data_set_id", "impact_id"], ["impacts.data_set_id", "impacts.id"]),
 )
-
-traces = Table(
-    "traces",
-    metadata,
-    Column("impact_id", Identifier, primary_key=True),
-    Column("revision", Integer, primary_key=True, autoincrement=False),
-    Column("signals", LargeBinary, nullable=False),
-    ForeignKeyConstraint(["impact_id", "revision"], ["impact_revisions.impact_id", "impact_revisions.revision"]),
+# Erasing an athlete must find the revisions that a correction moved to somebody else, and only those: as a partial
+# index it costs nothing until there is one.
+Index(
+    "ix_impact_revisions_superseded_athlete_id",
+    impact_revisions.c.athlete_id,
+    sqlite_where=impact_revisions.c.superseded_at.is_not(None),
+    postgresql_where=impact_revisions.c.superseded_at.is_not(None),
 )
 
 scores = Table(
