@@ -13,6 +13,7 @@ import io
 import re
 from collections.abc import Iterator, Sequence
 from itertools import chain, islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,11 +24,15 @@ from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
 
+if TYPE_CHECKING:
+    from _csv import Reader
+
 MAX_LINE = 256 * 1024
 MAX_COLUMNS = 1024
-ROWS_AT_ONCE = 8192
+ROWS_AT_ONCE = 4096
 _DELIMITERS = (",", ";", "\t")
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*")
+Block = tuple[FloatArray, list[list[str]]]
 # float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
@@ -51,50 +56,75 @@ class CsvTable:
         """Read as far as the headings; 422 where there are none."""
         _require_text(data)
         self._lines = io.TextIOWrapper(io.BytesIO(data), encoding=_encoding(data), newline="")
+        self._quoted = b'"' in data
+        self._line = 0
         heading = self._first_line(skip_rows)
         self._delimiter = _delimiter(heading)
-        self._rows = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
-        self.headings: tuple[str, ...] = tuple(self._next_rows(1)[0])
+        self._reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
+        self.headings: tuple[str, ...] = tuple(self._rows(self._reader, 1)[0])
         if len(self.headings) > MAX_COLUMNS:
             raise _unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
 
     def read(self, numbers: Sequence[int], texts: Sequence[int], max_rows: int) -> Columns:
         """The columns, block by block, so that only numbers are kept of the numbers."""
-        blocks: dict[int, list[FloatArray]] = {index: [] for index in numbers}
+        blocks: list[FloatArray] = [np.empty((0, len(numbers)))]
         words: dict[int, list[str]] = {index: [] for index in texts}
         count = 0
-        for cells in self._blocks():
-            count += len(cells[0])
+        for samples, cells in self._blocks(numbers, texts):
+            count += len(samples)
             if count > max_rows:
                 raise _unreadable(f"An impact may have at most {max_rows} samples; a mapping's group_by parts a file.")
-            for index in numbers:
-                blocks[index].append(self._numbers(cells[index]))
-            for index in texts:
-                words[index] += cells[index]
-        joined = {index: np.concatenate(parts or [np.empty(0)]) for index, parts in blocks.items()}
-        return Columns(rows=count, numbers=joined, texts=words)
+            blocks.append(samples)
+            for index, column in zip(texts, cells, strict=True):
+                words[index] += column
+        columns = np.ascontiguousarray(np.concatenate(blocks).T)
+        return Columns(rows=count, numbers=dict(zip(numbers, columns, strict=True)), texts=words)
 
     def _first_line(self, skip_rows: int) -> str:
         """The line of headings: the first that is neither skipped, empty nor a comment."""
-        for line in islice(self._lines, skip_rows, None):
-            if line.strip() and not line.startswith("#"):
+        for number, line in enumerate(self._lines):
+            if number >= skip_rows and line.strip() and not line.startswith("#"):
+                self._line = number
                 return line
         raise _unreadable("The file has no line of headings.")
 
-    def _blocks(self) -> Iterator[list[tuple[str, ...]]]:
-        """The cells by column, some thousand rows at a time."""
-        while rows := self._next_rows(ROWS_AT_ONCE):
-            full = [row for row in rows if row]
-            if set(map(len, full)) - {len(self.headings)}:
-                full = [fitted for row in full if (fitted := self._fitted(row))]
-            if full:
-                yield list(zip(*full, strict=True))
+    def _blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
+        """Some thousand rows at a time: the number columns as one array, the text columns as lists."""
+        if self._quoted:
+            while rows := self._rows(self._reader, ROWS_AT_ONCE):
+                yield self._careful(rows, numbers, texts)
+            return
+        self._line += 1
+        while lines := list(islice(self._lines, ROWS_AT_ONCE)):
+            yield self._fast(lines, numbers, texts) or self._careful(
+                self._rows(csv.reader(lines, delimiter=self._delimiter, strict=True), len(lines)), numbers, texts
+            )
+            self._line += len(lines)
 
-    def _next_rows(self, count: int) -> list[list[str]]:
+    def _fast(self, lines: list[str], numbers: Sequence[int], texts: Sequence[int]) -> Block | None:
+        """A block without quotes, a line a row, by NumPy's own reader; None where a line is not as plain as that."""
+        cuts = {line.count(self._delimiter) for line in lines}
+        if cuts != {len(self.headings) - 1}:
+            return None
         try:
-            return list(islice(self._rows, count))
+            samples = np.loadtxt(lines, delimiter=self._delimiter, usecols=list(numbers), ndmin=2, comments=None)
+        except ValueError:
+            return None
+        if len(samples) != len(lines):
+            return None
+        return samples, [[line.split(self._delimiter, index + 1)[index] for line in lines] for index in texts]
+
+    def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
+        """A block cell by cell, saying what is wrong with it."""
+        full = [fitted for row in rows if (fitted := self._fitted(row))]
+        samples = np.array([[self._number(row[index]) for index in numbers] for row in full], dtype=np.float64)
+        return samples.reshape(len(full), len(numbers)), [[row[index] for row in full] for index in texts]
+
+    def _rows(self, reader: Reader, count: int) -> list[list[str]]:
+        try:
+            return list(islice(reader, count))
         except csv.Error:
-            raise _unreadable(f"The quotes around line {self._rows.line_num} do not match.") from None
+            raise _unreadable(f"The quotes around line {self._line + reader.line_num} do not match.") from None
 
     def _fitted(self, row: list[str]) -> list[str]:
         """A row as long as the headings: spreadsheets add empty cells at the end, and rows of nothing else."""
@@ -103,21 +133,12 @@ class CsvTable:
             return []
         if len(row) < width or any(cell.strip() for cell in row[width:]):
             raise _unreadable(
-                f"A row up to line {self._rows.line_num} has {len(row)} cells where the headings have {width}."
+                f"A row from line {self._line + 1} on has {len(row)} cells where the headings have {width}."
             )
         return row[:width]
 
-    def _numbers(self, cells: Sequence[str]) -> FloatArray:
-        """A block of one column; NaN where a cell is no number."""
-        text = "".join(cells)
-        if text.isascii() and "_" not in text:
-            try:
-                return np.fromiter(map(float, cells), dtype=np.float64, count=len(cells))
-            except ValueError:
-                pass
-        return np.array([self._number(cell) for cell in cells], dtype=np.float64)
-
     def _number(self, cell: str) -> float:
+        """The number in a cell; NaN where there is none."""
         if _NUMBER.fullmatch(cell) is not None:
             return float(cell)
         if self._delimiter != "," and _DECIMAL_COMMA.fullmatch(cell) is not None:

@@ -18,7 +18,7 @@ from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.impact_json import MAX_SAMPLES, PRINTABLE
 from headimpact_service.ingest.impact_reading import low_pass, mounting
-from headimpact_service.ingest.layout import Layout, lay_out
+from headimpact_service.ingest.layout import Layout, SignalLayout, lay_out
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import Preset, preset_named, recognise
@@ -64,9 +64,10 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     impacts = _impacts(layout, columns)
     if len(impacts) > options.max_impacts:
         raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
+    samples = _Samples(layout, columns)
     for rows in impacts:
         try:
-            yield _Impact(plan, layout, columns, headings, rows).record()
+            yield _Impact(plan, samples, rows).record()
         except Problem as problem:
             yield problem
 
@@ -132,11 +133,44 @@ def _joined(parts: list[slice]) -> list[int]:
     return [row for part in parts for row in range(part.start, part.stop)]
 
 
+class _Samples:
+    """The whole table's columns, put together into signals once for all its impacts."""
+
+    def __init__(self, layout: Layout, columns: Columns) -> None:
+        self.layout, self.texts = layout, columns.texts
+        self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
+        self.stamps = None if layout.time is None else columns.numbers[layout.time]
+        self._numbers = columns.numbers
+        self._finite = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
+
+    def require_finite(self, rows: Rows, first: int) -> None:
+        """Refuse an impact in which a cell is not a finite number."""
+        if self._finite:
+            return
+        for column, numbers in self._numbers.items():
+            faulty = np.flatnonzero(~np.isfinite(numbers[rows]))
+            if faulty.size:
+                raise _fault(
+                    f"A cell of column {column + 1} is not a finite number, at sample {faulty[0]} of the impact that "
+                    f"begins in row {first + 1} below the headings.",
+                    "missing-sample",
+                )
+
+
+def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
+    """A signal's three columns with their signs; one that a constrained plane leaves out is zero."""
+    values = np.zeros((columns.rows, 3))
+    for axis, component in enumerate(signal.components):
+        if component.column is not None:
+            np.multiply(columns.numbers[component.column], component.sign, out=values[:, axis])
+    return values
+
+
 class _Impact:
     """One impact of a table."""
 
-    def __init__(self, plan: Plan, layout: Layout, columns: Columns, headings: Headings, rows: Rows) -> None:
-        self.plan, self.layout, self.columns, self.headings = plan, layout, columns, headings
+    def __init__(self, plan: Plan, samples: _Samples, rows: Rows) -> None:
+        self.plan, self.samples, self.layout = plan, samples, samples.layout
         self.mapping, self.options = plan.mapping, plan.options
         self.rows = rows
         self.first = rows.start if isinstance(rows, slice) else rows[0]
@@ -172,22 +206,29 @@ class _Impact:
         mapping, options = self.mapping, self.options
         axes: AxesName = options.axes or mapping.axes or "anatomical"
         sensor = mapping.location == "sensor"
-        stamps = self._stamps()
-        signals: dict[SignalName, Signal | None] = {name: self._signal(name, stamps) for name in self.layout.signals}
+        self.samples.require_finite(self.rows, self.first)
+        # Counts of hours in microseconds lose their last digits if they are scaled first: they stay as they stand.
+        stamps = None if self.samples.stamps is None else self.samples.stamps[self.rows]
+        rate, elapsed_s = self._rate(stamps)
+        signals: dict[str, Any] = {name: self._signal(name, rate, elapsed_s) for name in self.layout.signals}
         return Recording(
-            linear_acceleration=signals.get("linear_acceleration"),
-            angular_velocity=signals.get("angular_velocity"),
-            angular_acceleration=signals.get("angular_acceleration"),
             axes=axes,
             mounting=mounting(mapping.mounting) if sensor and mapping.mounting is not None else None,
             constrained_plane=mapping.constrained_plane,
             low_pass=options.low_pass or (PAPER if mapping.filter is None else low_pass(mapping.filter)),
             pre_trigger_ms=self._pre_trigger_ms(stamps),
+            **signals,
         )
 
-    def _stamps(self) -> FloatArray | None:
-        """The file's own stamps, as they stand: counts of hours lose their last digits if they are scaled first."""
-        return None if self.layout.time is None else self._numbers(self.layout.time)
+    def _rate(self, stamps: FloatArray | None) -> tuple[float | None, FloatArray | None]:
+        """The rate that is stated, given beside the file or said by uniform stamps; else the times [s]."""
+        if self.options.sample_rate_hz is not None:
+            return self.options.sample_rate_hz, None
+        if stamps is None:
+            return self.mapping.sample_rate_hz, None
+        elapsed_s = (stamps - stamps[:1]) * self.layout.time_factor
+        rate = nominal_rate(elapsed_s)
+        return (None, elapsed_s) if rate is None else (rate, None)
 
     def _pre_trigger_ms(self, stamps: FloatArray | None) -> float | None:
         if self.mapping.pre_trigger_ms is not None:
@@ -202,41 +243,17 @@ class _Impact:
             raise _fault("The record's times must include zero, which its layout says is the trigger.", "time-zero")
         return round(-1000.0 * float(stamps[0]) * self.layout.time_factor, 9) + 0.0
 
-    def _signal(self, name: SignalName, stamps: FloatArray | None) -> Signal:
-        laid = self.layout.signals[name]
-        first = next(c.column for c in laid.components if c.column is not None)
-        values = np.zeros((self._numbers(first).size, 3))
-        for axis, component in enumerate(laid.components):
-            if component.column is not None:
-                values[:, axis] = self._numbers(component.column) * component.sign
+    def _signal(self, name: SignalName, rate: float | None, elapsed_s: FloatArray | None) -> Signal:
+        # A copy, so that one impact that is kept does not keep the whole table.
+        values = self.samples.signals[name][self.rows].copy()
         if values.shape[0] > MAX_SAMPLES:
             raise _fault(f"An impact may have at most {MAX_SAMPLES} samples.", "sample-count")
-        rate = self.options.sample_rate_hz or (None if stamps is not None else self.mapping.sample_rate_hz)
-        if rate is not None or stamps is None:
-            return Signal(values=values, unit=laid.unit, sample_rate_hz=rate)
-        elapsed = (stamps - stamps[:1]) * self.layout.time_factor
-        rate = nominal_rate(elapsed)
-        if rate is not None:
-            return Signal(values=values, unit=laid.unit, sample_rate_hz=rate)
-        return Signal(values=values, unit=laid.unit, time_s=elapsed)
-
-    def _numbers(self, column: int) -> FloatArray:
-        """One column of this impact, refused where a cell is not a finite number."""
-        numbers = self.columns.numbers[column][self.rows]
-        finite = np.isfinite(numbers)
-        if not finite.all():
-            sample = int(np.flatnonzero(~finite)[0])
-            raise _fault(
-                f"A cell of column {column + 1} is not a finite number, at sample {sample} of the impact that begins "
-                f"in row {self.first + 1} below the headings.",
-                "missing-sample",
-            )
-        return numbers
+        return Signal(values=values, unit=self.layout.signals[name].unit, sample_rate_hz=rate, time_s=elapsed_s)
 
     def _text(self, column: int | None) -> str | None:
         if column is None:
             return None
-        return self.columns.texts[column][self.first].strip() or None
+        return self.samples.texts[column][self.first].strip() or None
 
     def _name(self, field: str, column: int | None) -> str | None:
         text = self._text(column)
