@@ -216,7 +216,7 @@ PROBLEMS: Mapping[str, ProblemType] = MappingProxyType(
 )
 
 
-class Problem(Exception):
+class Problem(Exception):  # noqa: N818 - the name of RFC 9457; it is an answer, not a fault
     """A request that fails, as one problem type.
 
     `detail` is a sentence for people that never holds the offending value. `extra` are further members of the
