@@ -1,0 +1,195 @@
+"""A record and the terms of its organisation in, the document of its score out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from headimpact.criteria.extra import EXTRA_CRITERIA
+from headimpact.errors import OperatingPointUnreachable, TraceError
+from headimpact.preparation import Preparation, prepare
+from headimpact.quality import QualityNote
+from headimpact.recording import Mounting, Recording, Signal
+from headimpact.risk import (
+    DEFAULT_OPERATING_POINTS,
+    LAKSARI_2020,
+    OperatingPoint,
+    OperatingPointRequest,
+    RiskModel,
+    resolve_operating_point,
+)
+from headimpact.scoring import ImpactScore, score, score_many
+from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest.digest import input_digest
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.trace_errors import trace_problem
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What an organisation has its impacts scored with."""
+
+    incidence: float | None = None
+    operating_points: tuple[OperatingPointRequest, ...] = DEFAULT_OPERATING_POINTS
+    model: RiskModel = LAKSARI_2020
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFacts:
+    """What a device's own page says that a score depends on."""
+
+    mounting: Mounting | None = None
+    linear_acceleration_range_g: float | None = None
+    angular_velocity_range_rad_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Scored:
+    """A record with its score; `score` and `preparation` are None where it must not be scored."""
+
+    record: ImpactRecord
+    terms: Terms
+    score: ImpactScore | None
+    preparation: Preparation | None
+    points: tuple[OperatingPoint, ...]
+    reasons: tuple[str, ...]
+    input_digest: bytes
+    """SHA-256 of what the score depends on."""
+
+
+UNKNOWN_DEVICE = DeviceFacts()
+NOT_WORN = QualityNote("not_worn", "note", "The device reports that it was not worn.")
+
+
+def score_record(record: ImpactRecord, terms: Terms, device: DeviceFacts = UNKNOWN_DEVICE) -> Scored:
+    """Score a record, or say why it must not be scored.
+
+    Raises
+    ------
+    Problem
+        422 for a record that breaks a rule, or that asks for what the model does not have.
+    """
+    unscored = _prepared(record, terms, device)
+    if unscored.preparation is None:
+        return unscored
+    found = score(
+        unscored.preparation, terms.model, incidence=terms.incidence, extra_criteria=unscored.record.extra_criteria
+    )
+    return replace(unscored, score=found)
+
+
+def score_records(records: Sequence[tuple[ImpactRecord, DeviceFacts]], terms: Terms) -> list[Scored | Problem]:
+    """Score many records together, with the same digits as one by one; what is wrong with one stands in its place."""
+    unscored = [_prepared_or_problem(record, terms, device) for record, device in records]
+    batches: dict[tuple[str, ...], list[int]] = {}
+    for index, item in enumerate(unscored):
+        if isinstance(item, Scored) and item.preparation is not None:
+            batches.setdefault(item.record.extra_criteria, []).append(index)
+    for extra, members in batches.items():
+        ready = [item for index in members if isinstance(item := unscored[index], Scored)]
+        preparations = [item.preparation for item in ready if item.preparation is not None]
+        found = score_many(preparations, terms.model, incidence=terms.incidence, extra_criteria=extra)
+        for index, item, result in zip(members, ready, found, strict=True):
+            unscored[index] = replace(item, score=result)
+    return unscored
+
+
+def _prepared_or_problem(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored | Problem:
+    try:
+        return _prepared(record, terms, device)
+    except Problem as problem:
+        return problem
+
+
+def _prepared(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored:
+    """Everything but the score itself."""
+    points = operating_points(record.operating_points, terms)
+    _require_known(record.extra_criteria)
+    record = with_device(record, device)
+    if record.context.get("worn") is False:
+        record = replace(record, notes=(*record.notes, NOT_WORN))
+    digest = digest_bytes(input_digest(record))
+    if record.unscorable:
+        return Scored(record, terms, None, None, points, record.unscorable, digest)
+    try:
+        preparation = prepare(record.recording)
+    except TraceError as error:
+        raise trace_problem(error) from None
+    return Scored(record, terms, None, preparation, points, (), digest)
+
+
+def _require_known(extra_criteria: Sequence[str]) -> None:
+    for index, name in enumerate(extra_criteria):
+        if name not in EXTRA_CRITERIA:
+            detail = f"Extra criteria are {', '.join(EXTRA_CRITERIA)}."
+            error = PayloadError(detail=detail, code="not-allowed", pointer=f"/extra_criteria/{index}")
+            raise Problem("invalid-payload", detail, errors=[error])
+
+
+def digest_bytes(text: str) -> bytes:
+    """The 32 bytes of a digest that is written `sha256:…`."""
+    return bytes.fromhex(text.removeprefix("sha256:"))
+
+
+def with_device(record: ImpactRecord, device: DeviceFacts) -> ImpactRecord:
+    """The record with what its device's page adds: the mounting where it needs one, the ranges where it has none."""
+    recording = record.recording
+    if record.needs_device_mounting:
+        if device.mounting is None:
+            raise mounting_missing()
+        recording = replace(recording, mounting=device.mounting)
+    if device is not UNKNOWN_DEVICE:
+        recording = _with_ranges(recording, device)
+    return (
+        record if recording is record.recording else replace(record, recording=recording, needs_device_mounting=False)
+    )
+
+
+def mounting_missing() -> Problem:
+    """The 422 for signals of the sensor whose place on the head nobody has said."""
+    detail = "Signals of the sensor need a mounting, inline or of the device."
+    error = PayloadError(detail=detail, code="mounting-missing", pointer="/kinematics/mounting")
+    return Problem("mounting-missing", detail, errors=[error])
+
+
+def _with_ranges(recording: Recording, device: DeviceFacts) -> Recording:
+    linear = _with_range(recording.linear_acceleration, device.linear_acceleration_range_g, "g")
+    angular = _with_range(recording.angular_velocity, device.angular_velocity_range_rad_s, "rad/s")
+    return replace(recording, linear_acceleration=linear, angular_velocity=angular)
+
+
+def _with_range(signal: Signal | None, full_scale: float | None, unit: str) -> Signal | None:
+    if signal is None or full_scale is None or signal.declared_range is not None:
+        return signal
+    return replace(signal, declared_range=full_scale * _PER_UNIT[signal.unit] / _PER_UNIT[unit])
+
+
+# How many of a unit make one of the criteria's.
+_PER_UNIT = {"g": 1.0, "m/s^2": 9.80665, "rad/s": 1.0, "deg/s": 57.29577951308232}
+
+
+def operating_points(asked: Sequence[OperatingPointRequest] | None, terms: Terms) -> tuple[OperatingPoint, ...]:
+    """The thresholds that were asked for, in that order; the organisation's default where none were."""
+    if asked is None:
+        return _known_points(terms.operating_points, terms.model.version, terms.incidence)
+    return tuple(_point(request, terms, index) for index, request in enumerate(asked))
+
+
+@lru_cache(maxsize=64)
+def _known_points(
+    requests: tuple[OperatingPointRequest, ...], version: str, incidence: float | None
+) -> tuple[OperatingPoint, ...]:
+    terms = Terms(incidence=incidence)
+    assert terms.model.version == version
+    return tuple(_point(request, terms, index) for index, request in enumerate(requests))
+
+
+def _point(request: OperatingPointRequest, terms: Terms, index: int) -> OperatingPoint:
+    try:
+        return resolve_operating_point(request, terms.model, terms.incidence)
+    except OperatingPointUnreachable as error:
+        fault = PayloadError(
+            detail=str(error), code="operating-point-unreachable", pointer=f"/operating_points/{index}"
+        )
+        raise Problem("operating-point-unreachable", str(error), errors=[fault]) from None
