@@ -1,0 +1,169 @@
+"""What an operation stands on: the caller that a key names, and the database."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeVar
+
+from anyio.to_thread import run_sync
+from sqlalchemy import Connection
+from starlette.applications import Starlette
+from starlette.requests import Request
+
+from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
+from headimpact_service.errors import Problem
+from headimpact_service.intake.scoring import Terms
+from headimpact_service.settings import Settings
+from headimpact_service.store import ids, keys
+from headimpact_service.store.database import Database
+
+T = TypeVar("T")
+
+SCOPES = (
+    "score",
+    "impacts:read",
+    "impacts:write",
+    "labels:read",
+    "labels:write",
+    "athletes:read",
+    "athletes:write",
+    "models:read",
+    "models:fit",
+    "models:promote",
+    "webhooks",
+    "events:read",
+    "admin",
+)
+ANY = "*"
+"""The access of an operation that any valid key may use."""
+
+REMEMBER_S = 5.0
+"""How long a key's lookup is trusted: a key revoked by another process works at most this much longer."""
+REMEMBERED = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Whoever a key speaks for."""
+
+    key: keys.KeyRow
+    terms: Terms
+
+    @property
+    def data_set_id(self) -> bytes:
+        """The data set that the key sees: live or test, of one organisation."""
+        return self.key.data_set_id
+
+
+@dataclass(slots=True)
+class Gate:
+    """Looks keys up, remembers them for a moment, and counts their requests if a rate is configured."""
+
+    database: Database
+    rate_limit: int | None = None
+    remembered: dict[bytes, tuple[float, Caller]] = field(default_factory=dict)
+    counts: dict[bytes, int] = field(default_factory=dict)
+    minute: int = 0
+
+    async def caller(self, authorization: str | None) -> Caller:
+        """The caller of a request with this Authorization header; 401 if there is none."""
+        scheme, _, key = (authorization or "").partition(" ")
+        if scheme.lower() != "bearer" or not key.strip():
+            raise _unauthenticated("The Authorization header must be `Bearer <key>`.")
+        digest = keys.digest(key.strip())
+        until, caller = self.remembered.get(digest, (0.0, None))
+        if caller is None or time.monotonic() > until:
+            caller = await self._look_up(digest)
+        self._count(caller.key.id)
+        return caller
+
+    def forget(self) -> None:
+        """Look every key up again: one was revoked, or an organisation's settings changed."""
+        self.remembered.clear()
+
+    async def _look_up(self, digest: bytes) -> Caller:
+        self.remembered.pop(digest, None)
+        found = await run_sync(self._find, digest)
+        if found is None:
+            raise _unauthenticated("The key is unknown, expired or revoked.")
+        caller = Caller(found, terms_of(found))
+        if len(self.remembered) >= REMEMBERED:
+            self.remembered.clear()
+        self.remembered[digest] = (time.monotonic() + REMEMBER_S, caller)
+        return caller
+
+    def _find(self, digest: bytes) -> keys.KeyRow | None:
+        with self.database.read() as conn:
+            return keys.find_key(conn, digest)
+
+    def _count(self, key_id: bytes) -> None:
+        if self.rate_limit is None:
+            return
+        now = time.time()
+        if int(now // 60) != self.minute:
+            self.minute = int(now // 60)
+            self.counts.clear()
+        self.counts[key_id] = self.counts.get(key_id, 0) + 1
+        if self.counts[key_id] > self.rate_limit:
+            wait = str(60 - int(now % 60))
+            detail = f"This key may make {self.rate_limit} requests a minute."
+            raise Problem("too-many-requests", detail, headers={"Retry-After": wait})
+
+
+def _unauthenticated(detail: str) -> Problem:
+    return Problem("unauthenticated", detail, headers={"WWW-Authenticate": 'Bearer realm="headimpact"'})
+
+
+def terms_of(key: keys.KeyRow) -> Terms:
+    """What the key's organisation has its impacts scored with."""
+    points = tuple(OperatingPointRequest(**point) for point in key.operating_points)  # type: ignore[arg-type]
+    return Terms(incidence=key.incidence, operating_points=points or DEFAULT_OPERATING_POINTS)
+
+
+async def authorize(request: Request, access: str) -> Caller:
+    """The caller; 401 without a valid key, 403 without the scope that `access` names."""
+    gate: Gate = request.app.state.gate
+    caller = await gate.caller(request.headers.get("authorization"))
+    if access != ANY and access not in caller.key.scopes:
+        raise Problem("insufficient-scope", f"This operation needs a key with the scope {access}.")
+    return caller
+
+
+def set_up(app: Starlette, settings: Settings, database: Database) -> None:
+    """Give the application what its operations stand on."""
+    app.state.settings = settings
+    app.state.database = database
+    app.state.gate = Gate(database, settings.rate_limit)
+
+
+async def read(request: Request, query: Callable[[Connection], T]) -> T:
+    """The result of a query, run beside the event loop."""
+    database: Database = request.app.state.database
+    return await run_sync(partial(_read, database, query))
+
+
+def _read(database: Database, query: Callable[[Connection], T]) -> T:
+    with database.read() as conn:
+        return query(conn)
+
+
+async def write(request: Request, change: Callable[[Connection], T]) -> T:
+    """The result of a change, once it is committed."""
+    database: Database = request.app.state.database
+    return await database.write_async(change)
+
+
+def identifier(prefix: str, text: str, what: str) -> bytes:
+    """The identifier in a path; 404 if it cannot be one of ours."""
+    found = ids.decode(prefix, text)
+    if found is None:
+        raise Problem("not-found", f"There is no such {what}.")
+    return found
+
+
+def filter_identifier(prefix: str, text: str) -> bytes:
+    """The identifier in a filter; one that cannot be ours is nobody's, so the list is empty."""
+    return ids.decode(prefix, text) or bytes(ids.LENGTH)

@@ -1,0 +1,1 @@
+"""HTTP: one module per resource, request and answer shapes beside the route."""

@@ -1,0 +1,200 @@
+"""Impacts: sent once, read, listed, corrected with their revisions kept, deleted with a tombstone left."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+from starlette.responses import Response
+
+from headimpact_service import deps
+from headimpact_service.answers import answer, json_bytes, no_content
+from headimpact_service.errors import invalid_parameter, not_found
+from headimpact_service.ingest.digest import content_digest
+from headimpact_service.ingest.impact_json import CriterionKey, ImpactBody
+from headimpact_service.ingest.impact_reading import to_record
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.intake.rendering import scored_traces
+from headimpact_service.intake.scoring import Scored, digest_bytes
+from headimpact_service.intake.storing import new_impact
+from headimpact_service.routes.impact_shapes import COLUMNS, ImpactList, ImpactView, impact_cells, impact_document
+from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
+from headimpact_service.routes.operation import Answer, Call, Routes
+from headimpact_service.routes.parameters import Fraction, Instant, SyncQuery
+from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
+from headimpact_service.routes.scoring import RECORD_PROBLEMS, score
+from headimpact_service.store import impacts
+from headimpact_service.store.impacts import Impact, ImpactFilters, NewImpact
+
+routes = Routes("impacts")
+
+ETAG = {"ETag": "The revision, for If-Match."}
+LOCATION = {"Location": "The impact's address."}
+Text = Annotated[str | None, Field(min_length=1, max_length=200)]
+
+
+@routes(
+    "POST",
+    "/v1/impacts",
+    "Send an impact",
+    "impacts:write",
+    {
+        201: Answer(ImpactView, "Stored, with its score.", headers=ETAG | LOCATION),
+        200: Answer(ImpactView, "It was stored before, with this content.", headers=ETAG | LOCATION),
+    },
+    body=ImpactBody,
+    problems=(*RECORD_PROBLEMS, "external-id-conflict", "impact-deleted"),
+)
+async def create_impact(call: Call) -> Response:
+    """Committed before the answer. With an `external_id` it is safe to send again: 200 for the same content."""
+    record = to_record(call.body)
+    scored, new = await _scored(call, record)
+    outcome = await deps.write(call.request, lambda conn: impacts.add(conn, call.data_set_id, new))
+    created = outcome.status == "created"
+    return _answer(outcome.impact, 201 if created else 200, scored if created else None)
+
+
+async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
+    """The record's score, and the rows of both."""
+    sent = digest_bytes(content_digest(record))
+    scored = await score(call, record)
+    return scored, new_impact(scored, sent, call.key.id)
+
+
+def _answer(impact: Impact, status: int, scored: Scored | None) -> Response:
+    document = impact_document(impact)
+    if scored is not None and "traces" in scored.record.include:
+        document["score"]["traces"] = scored_traces(scored)
+    headers = {**etag(impact.revision), "Location": f"/v1/impacts/{document['id']}"}
+    return answer(json_bytes(document), status, headers)
+
+
+class ImpactQuery(SyncQuery):
+    """Which impacts."""
+
+    athlete_id: Text = Field(None, description="Of this athlete.")
+    external_id: Text = Field(None, description="The one that you call this.")
+    device_serial: Text = Field(None, description="From this device.")
+    session_id: Text = Field(None, description="Of this session.")
+    occurred_from: Annotated[Instant | None, Field(description="At this time or later.")] = None
+    occurred_to: Annotated[Instant | None, Field(description="Before this time.")] = None
+    quality_code: Annotated[str | None, Field(pattern=r"^[a-z_]{1,64}$", description="With this quality note.")] = None
+    criterion: Annotated[CriterionKey | None, Field(description="The one that `min_probability` is about.")] = None
+    min_probability: Annotated[
+        Fraction | None, Field(ge=0, le=1, description="Where `criterion` gives at least this probability.")
+    ] = None
+
+
+@routes(
+    "GET",
+    "/v1/impacts",
+    "List impacts",
+    "impacts:read",
+    {200: Answer(ImpactList, "A page of impacts, newest first.", MEDIA_TYPES)},
+    query=ImpactQuery,
+    problems=("bad-cursor",),
+)
+async def list_impacts(call: Call) -> Response:
+    """With `updated_since` in the order of change, deleted impacts as tombstones."""
+    query: ImpactQuery = call.query
+    filters = _filters(query)
+    listing = Listing(
+        "impacts",
+        lambda conn, after, limit: impacts.page(
+            conn, call.data_set_id, filters, updated_since=query.updated_since, limit=limit, after=after
+        ),
+        impact_document,
+        COLUMNS,
+        impact_cells,
+    )
+    return await answer_list(call, listing, query)
+
+
+def _filters(query: ImpactQuery) -> ImpactFilters:
+    if (query.criterion is None) != (query.min_probability is None):
+        raise invalid_parameter("criterion", "criterion and min_probability go together.", "one-of")
+    probability = None
+    if query.criterion is not None and query.min_probability is not None:
+        probability = (query.criterion, query.min_probability)
+    return ImpactFilters(
+        athlete_id=None if query.athlete_id is None else deps.filter_identifier("ath", query.athlete_id),
+        external_id=query.external_id,
+        device_serial=query.device_serial,
+        session_id=query.session_id,
+        occurred_from=query.occurred_from,
+        occurred_to=query.occurred_to,
+        quality_code=query.quality_code,
+        min_probability=probability,
+    )
+
+
+@routes(
+    "GET",
+    "/v1/impacts/{impact_id}",
+    "Read an impact",
+    "impacts:read",
+    {200: Answer(ImpactView, "The impact with its score.", headers=ETAG)},
+    problems=("not-found",),
+)
+async def read_impact(call: Call) -> Response:
+    """The same as the answer to its POST, without traces."""
+    found = await present(call)
+    return answer(impact_document(found), headers=etag(found.revision))
+
+
+async def present(call: Call) -> Impact:
+    """The impact in the path; 404 if it is none of the caller's, or deleted."""
+    impact_id = identifier(call)
+    found = await deps.read(call.request, lambda conn: impacts.get(conn, call.data_set_id, impact_id))
+    if found is None:
+        raise not_found("impact")
+    return found
+
+
+def identifier(call: Call) -> bytes:
+    """The impact's identifier in the path."""
+    return deps.identifier("imp", call.path("impact_id"), "impact")
+
+
+@routes(
+    "PUT",
+    "/v1/impacts/{impact_id}",
+    "Correct an impact",
+    "impacts:write",
+    {200: Answer(ImpactView, "The impact as it is now.", headers=ETAG | LOCATION)},
+    body=ImpactBody,
+    request_headers=IF_MATCH,
+    problems=(
+        *RECORD_PROBLEMS,
+        "not-found",
+        "conflict",
+        "external-id-conflict",
+        "precondition-failed",
+        "precondition-required",
+    ),
+)
+async def correct_impact(call: Call) -> Response:
+    """The whole impact anew, also under another athlete (swapped sensors). The revision before is kept."""
+    impact_id, revision = identifier(call), if_match(call.request, required=True)
+    await present(call)
+    scored, new = await _scored(call, to_record(call.body))
+    outcome = await deps.write(
+        call.request, lambda conn: impacts.correct(conn, call.data_set_id, impact_id, new, if_match=revision)
+    )
+    return _answer(outcome.impact, 200, scored if outcome.status == "corrected" else None)
+
+
+@routes(
+    "DELETE",
+    "/v1/impacts/{impact_id}",
+    "Delete an impact",
+    "impacts:write",
+    {204: Answer(None, "Deleted; a tombstone is left.", ())},
+    request_headers=IF_MATCH,
+    problems=("not-found", "precondition-failed"),
+)
+async def delete_impact(call: Call) -> Response:
+    """Trace, score and revisions go. Its `external_id` stays taken, so that a redelivery does not bring it back."""
+    impact_id, revision = identifier(call), if_match(call.request)
+    await deps.write(call.request, lambda conn: impacts.delete(conn, call.data_set_id, impact_id, if_match=revision))
+    return no_content()

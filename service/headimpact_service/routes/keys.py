@@ -1,0 +1,123 @@
+"""Keys, and whom the present one speaks for."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+from starlette.responses import Response
+
+from headimpact_service import deps
+from headimpact_service.answers import answer, no_content
+from headimpact_service.ingest.impact_json import Name, Strict
+from headimpact_service.routes.operation import ANY_KEY, Answer, Call, Routes
+from headimpact_service.store import ids, keys
+
+routes = Routes("keys")
+
+Scope = Literal[deps.SCOPES]  # type: ignore[valid-type] # the one list of them
+Mode = Literal["live", "test"]
+
+
+class KeyView(BaseModel):
+    """A key without its secret."""
+
+    id: str
+    name: str
+    shown: str = Field(description="The first characters of the key.")
+    mode: Mode
+    scopes: list[str]
+    created_at: datetime
+    expires_at: datetime | None
+    revoked_at: datetime | None
+
+
+class NewKeyView(KeyView):
+    """A new key, with the secret that is shown this once."""
+
+    key: str
+
+
+class KeyListView(BaseModel):
+    """Every key of the organisation, newest first."""
+
+    data: list[KeyView]
+    next_cursor: None
+
+
+class CallerView(BaseModel):
+    """Whom a key speaks for."""
+
+    organisation: str
+    mode: Mode
+    key: KeyView
+
+
+class NewKeyBody(Strict):
+    """A key to be made."""
+
+    name: Name = Field("key", description="What it is for.")
+    scopes: Annotated[list[Scope], Field(min_length=1, max_length=len(deps.SCOPES))]
+    mode: Mode = Field("live", description="A test key sees a separate sandbox data set.")
+
+
+@routes("GET", "/v1/me", "Whom this key speaks for", ANY_KEY, {200: Answer(CallerView, "The key's owner.")})
+async def read_me(call: Call) -> Response:
+    """The organisation, the mode and the scopes of the key that was sent."""
+    return answer({"organisation": call.key.organisation_name, "mode": call.key.mode, "key": document(call.key)})
+
+
+@routes("GET", "/v1/keys", "The organisation's keys", "admin", {200: Answer(KeyListView, "All keys, on one page.")})
+async def list_keys(call: Call) -> Response:
+    """Revoked keys stay listed; secrets are never shown again."""
+    found = await deps.read(call.request, lambda conn: keys.list_keys(conn, call.key.organisation_id))
+    return answer({"data": [document(key) for key in found], "next_cursor": None})
+
+
+@routes(
+    "POST",
+    "/v1/keys",
+    "Make a key",
+    "admin",
+    {201: Answer(NewKeyView, "The key, shown this once.")},
+    body=NewKeyBody,
+)
+async def create_key(call: Call) -> Response:
+    """The key belongs to the caller's organisation."""
+    body: NewKeyBody = call.body
+    key, plaintext = await deps.write(
+        call.request,
+        lambda conn: keys.create_key(conn, call.key.organisation_name, body.scopes, body.mode, body.name),
+    )
+    return answer(document(key) | {"key": plaintext}, 201)
+
+
+@routes(
+    "DELETE",
+    "/v1/keys/{key_id}",
+    "Revoke a key",
+    "admin",
+    {204: Answer(None, "It is revoked.", ())},
+    problems=("not-found",),
+)
+async def revoke_key(call: Call) -> Response:
+    """From now on requests with it are refused, in other processes of this service within five seconds."""
+    key_id = deps.identifier("key", call.path("key_id"), "key")
+    await deps.write(call.request, lambda conn: keys.revoke_key(conn, call.key.organisation_id, key_id))
+    call.request.app.state.gate.forget()
+    return no_content()
+
+
+def document(key: keys.KeyRow) -> dict[str, Any]:
+    """A key as it is answered."""
+    return {
+        "id": ids.encode("key", key.id),
+        "name": key.name,
+        "shown": key.shown,
+        "mode": key.mode,
+        "scopes": sorted(key.scopes),
+        "created_at": key.created_at,
+        "expires_at": key.expires_at,
+        "revoked_at": key.revoked_at,
+    }

@@ -1,0 +1,123 @@
+"""Query parameters: read strictly, because a filter that is misread answers another question in silence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from datetime import datetime
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
+from starlette.requests import Request
+
+from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
+
+MAX_NAME = 100
+"""An unknown parameter's name is the caller's text: it is shown, but not at any length."""
+
+_WHOLE = re.compile(r"\d{1,18}", re.ASCII)
+_DECIMAL = re.compile(r"\d{1,18}(\.\d{1,18})?([eE][-+]?\d{1,3})?", re.ASCII)
+_INSTANT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,6})?(Z|[+-]\d\d:\d\d)", re.ASCII)
+
+
+def _whole(text: object) -> object:
+    if isinstance(text, str) and not _WHOLE.fullmatch(text):
+        raise ValueError("must be a whole number in decimal digits")
+    return text
+
+
+def _instant(text: object) -> object:
+    if isinstance(text, str) and not _INSTANT.fullmatch(text.upper()):
+        raise ValueError("must be an RFC 3339 time with an offset, such as 2026-11-20T19:04:05Z")
+    return text
+
+
+def _flag(text: object) -> object:
+    if isinstance(text, str) and text not in {"true", "false"}:
+        raise ValueError("must be true or false")
+    return text
+
+
+def _decimal(text: object) -> object:
+    if isinstance(text, str) and not _DECIMAL.fullmatch(text):
+        raise ValueError("must be a decimal number")
+    return text
+
+
+WholeNumber = Annotated[int, BeforeValidator(_whole)]
+Instant = Annotated[datetime, BeforeValidator(_instant), WithJsonSchema({"type": "string", "format": "date-time"})]
+Fraction = Annotated[float, BeforeValidator(_decimal)]
+Flag = Annotated[bool, BeforeValidator(_flag)]
+
+
+class Query(BaseModel):
+    """The parameters of one operation; one that is not declared is refused."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class NoQuery(Query):
+    """An operation without parameters."""
+
+
+Q = TypeVar("Q", bound=Query)
+
+
+class ListQuery(Query):
+    """What every list takes."""
+
+    limit: Annotated[WholeNumber, Field(ge=1, le=1000, description="Rows on a page.")] = 100
+    cursor: Annotated[
+        str | None, Field(min_length=1, max_length=1000, description="`next_cursor` of the page before, unchanged.")
+    ] = None
+
+
+class SyncQuery(ListQuery):
+    """What a list takes whose deletions stay visible."""
+
+    updated_since: Annotated[
+        Instant | None,
+        Field(
+            description="Only what changed at or after this time, oldest change first; deletions appear as tombstones."
+        ),
+    ] = None
+
+
+def parse_query(request: Request, model: type[Q]) -> Q:
+    """The request's query parameters as `model`; 422 for those that are unknown, repeated or wrong."""
+    return validate_parameters(request.query_params.multi_items() if request.scope["query_string"] else (), model)
+
+
+def validate_parameters(pairs: Iterable[tuple[str, Any]], model: type[Q]) -> Q:
+    """Names and values as `model`; 422 for those that are unknown, repeated or wrong."""
+    values: dict[str, Any] = {}
+    repeated: list[PayloadError] = []
+    for name, value in pairs:
+        if name in values:
+            repeated.append(_error(name, "May be given once.", "repeated"))
+        values[name] = value
+    if repeated:
+        raise _problem(repeated)
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        faults = error.errors(include_url=False, include_context=False, include_input=False)
+        raise _problem(
+            [_error(str(fault["loc"][0]), *_wording(fault["type"], fault["msg"])) for fault in faults]
+        ) from None
+
+
+def _wording(kind: str, message: str) -> tuple[str, str]:
+    if kind == "extra_forbidden":
+        return "This operation has no such parameter.", "unknown-parameter"
+    text = message.removeprefix("Value error, ")
+    return text[0].upper() + text[1:].rstrip(".") + ".", kind.replace("_", "-")
+
+
+def _error(name: str, detail: str, code: str) -> PayloadError:
+    return PayloadError(detail=detail, code=code, parameter=name[:MAX_NAME])
+
+
+def _problem(errors: list[PayloadError]) -> Problem:
+    first = errors[0]
+    return Problem("invalid-parameter", f"{first.parameter}: {first.detail}", errors=errors[:MAX_ERRORS])

@@ -1,0 +1,64 @@
+"""`POST /v1/score`: one impact scored, nothing stored."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from anyio.to_thread import run_sync
+from starlette.responses import Response
+
+from headimpact_service.answers import answer
+from headimpact_service.ingest.impact_json import ScoreBody
+from headimpact_service.ingest.impact_reading import to_record
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.intake.rendering import new_score, score_document, scored_traces
+from headimpact_service.intake.scoring import UNKNOWN_DEVICE, DeviceFacts, Scored, Terms, score_record
+from headimpact_service.routes.operation import Answer, Call, Routes
+from headimpact_service.routes.score_shapes import ScoreView
+
+routes = Routes("scores")
+
+MANY_SAMPLES = 4000
+"""From here on scoring leaves the event loop: it would hold up every other request for milliseconds."""
+
+RECORD_PROBLEMS = ("invalid-trace", "improper-rotation", "mounting-missing", "operating-point-unreachable")
+
+
+@routes(
+    "POST",
+    "/v1/score",
+    "Score an impact",
+    "score",
+    {200: Answer(ScoreView, "The score.")},
+    body=ScoreBody,
+    problems=RECORD_PROBLEMS,
+)
+async def score_impact(call: Call) -> Response:
+    """Nothing is stored; a device named by its serial lends its mounting, if it is known."""
+    record = to_record(call.body)
+    scored = await score(call, record)
+    document = score_document(new_score(scored))
+    if "traces" in record.include:
+        document["traces"] = scored_traces(scored)
+    return answer(document)
+
+
+async def score(call: Call, record: ImpactRecord) -> Scored:
+    """The record scored under the terms of the caller's organisation."""
+    device, record = await facts_of(call, record)
+    return await score_beside(record, call.terms, device)
+
+
+async def facts_of(call: Call, record: ImpactRecord) -> tuple[DeviceFacts, ImpactRecord]:
+    """What the record's device and athlete add to it."""
+    if record.device_serial is None and record.athlete_id is None and record.athlete_external_id is None:
+        return UNKNOWN_DEVICE, record
+    found: tuple[DeviceFacts, ImpactRecord] = await call.request.app.state.facts.of(call, record)
+    return found
+
+
+async def score_beside(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored:
+    """Score here if that is quick, else in a thread beside the event loop."""
+    if max((signal.values.shape[0] for _, signal in record.recording.signals()), default=0) < MANY_SAMPLES:
+        return score_record(record, terms, device)
+    return await run_sync(partial(score_record, record, terms, device))
