@@ -1,0 +1,1 @@
+"""What a browser is shown: the API's documentation and a page for each problem, all from this package."""
