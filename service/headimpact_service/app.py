@@ -1,0 +1,103 @@
+"""The application: every operation, the edge around them, and what they stand on."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import Response
+
+from headimpact_service import deps, openapi
+from headimpact_service.answers import problem_answer
+from headimpact_service.errors import PROBLEMS, Problem
+from headimpact_service.middleware import Edge
+from headimpact_service.pages import docs, problems
+from headimpact_service.routes import (
+    athletes,
+    devices,
+    health,
+    impact_parts,
+    impacts,
+    imports,
+    keys,
+    models,
+    scoring,
+    settings,
+)
+from headimpact_service.routes.facts import Facts
+from headimpact_service.routes.operation import Operation, resources
+from headimpact_service.settings import Settings
+from headimpact_service.store.database import Database
+
+# In the order of the documentation; the first are matched first, so the busy ones lead.
+_MODULES = (
+    scoring,
+    impacts,
+    impact_parts,
+    imports,
+    athletes,
+    devices,
+    models,
+    keys,
+    settings,
+    health,
+    problems,
+    docs,
+)
+OPERATIONS: tuple[Operation, ...] = tuple(
+    operation
+    for module in (
+        scoring,
+        impacts,
+        impact_parts,
+        imports,
+        athletes,
+        devices,
+        models,
+        keys,
+        settings,
+        health,
+        problems,
+        docs,
+    )
+    for operation in module.routes.operations
+)
+
+
+def create_app(configured: Settings, database: Database) -> Starlette:
+    """The application on a migrated database, which it closes when the server stops it."""
+    app = Starlette(
+        routes=resources(OPERATIONS),
+        middleware=[Middleware(Edge, access_log=configured.access_log)],
+        exception_handlers={Problem: _problem, HTTPException: _http_exception},
+        lifespan=_lifespan,
+    )
+    app.router.redirect_slashes = False  # /v1/impacts/ is another path, and nothing is there
+    deps.set_up(app, configured, database)
+    app.state.facts = Facts()
+    app.state.openapi = openapi.as_text(openapi.document(OPERATIONS)).encode()
+    return app
+
+
+@asynccontextmanager
+async def _lifespan(app: Starlette) -> AsyncIterator[None]:
+    yield
+    app.state.database.close()  # what is queued is written first: its senders were promised an answer
+
+
+async def _problem(_: Request, problem: Exception) -> Response:
+    assert isinstance(problem, Problem)
+    return problem_answer(problem)
+
+
+async def _http_exception(_: Request, exception: Exception) -> Response:
+    """What Starlette raises by itself: an unknown path."""
+    assert isinstance(exception, HTTPException)
+    slug = next((slug for slug, kind in PROBLEMS.items() if kind.status == exception.status_code), "internal-error")
+    return problem_answer(
+        Problem(slug, "There is nothing at this path." if slug == "not-found" else PROBLEMS[slug].meaning)
+    )

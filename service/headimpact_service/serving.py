@@ -1,0 +1,120 @@
+"""The server process: uvicorn, with a guard against clients that stall."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import uvicorn
+from starlette.types import ASGIApp
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from headimpact_service.settings import Settings
+
+SHUTDOWN_S = 20
+"""Requests under way may take this long to end once the process is told to stop."""
+
+
+class GuardedProtocol(HttpToolsProtocol):
+    """Closes a connection whose request head, or the rest of a body already answered, does not come in time.
+
+    uvicorn has no such bound: without it a few thousand silent connections hold the service. (A body that is still
+    being read is given up by `bodies.read_body`, with 408.)
+    """
+
+    head_timeout_s: ClassVar[float] = 20.0
+    rest_timeout_s: ClassVar[float] = 30.0
+    guard: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override] # as uvicorn has it
+        """A new connection owes a head."""
+        super().connection_made(transport)
+        self._expect_within(self.head_timeout_s)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Nothing is owed any more."""
+        self._met()
+        super().connection_lost(exc)
+
+    def on_message_begin(self) -> None:
+        """The first byte of the next request on a connection that is kept: it owes the rest of its head."""
+        super().on_message_begin()
+        if self.guard is None:
+            self._expect_within(self.head_timeout_s)
+
+    def on_headers_complete(self) -> None:
+        """The head is there."""
+        self._met()
+        super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        """The whole request is there."""
+        self._met()
+        super().on_message_complete()
+
+    def on_response_complete(self) -> None:
+        """An answer that did not wait for the whole body: the rest is discarded for a while, not for ever."""
+        super().on_response_complete()
+        if self.cycle.more_body and not self.transport.is_closing():
+            self._expect_within(self.rest_timeout_s)
+
+    def _expect_within(self, seconds: float) -> None:
+        self._met()
+        self.guard = self.loop.call_later(seconds, self._give_up)
+
+    def _met(self) -> None:
+        if self.guard is not None:
+            self.guard.cancel()
+            self.guard = None
+
+    def _give_up(self) -> None:
+        self.guard = None
+        if not self.transport.is_closing():
+            self.transport.close()
+
+
+class Server(uvicorn.Server):
+    """uvicorn's server, which says when it listens."""
+
+    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+        """`ready` is called once, when connections are accepted."""
+        super().__init__(config)
+        self.ready = ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, then say so."""
+        await super().startup(sockets)
+        if self.started:
+            self.ready()
+
+
+def listen(settings: Settings) -> socket.socket:
+    """A bound socket, so that the address is known, or refused, before anything else is said."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((settings.host, settings.port))
+    except OSError:
+        listener.close()
+        raise
+    return listener
+
+
+def run(app: ASGIApp, settings: Settings, listener: socket.socket, ready: Callable[[], None]) -> None:
+    """Serve until the process is told to stop; requests under way are answered first."""
+    bounds: dict[str, Any] = {"head_timeout_s": settings.head_timeout_s, "rest_timeout_s": settings.body_timeout_s}
+    config = uvicorn.Config(
+        app,
+        http=type("BoundedProtocol", (GuardedProtocol,), bounds),
+        ws="none",
+        lifespan="on",
+        access_log=False,
+        log_config=None,
+        server_header=False,
+        timeout_graceful_shutdown=SHUTDOWN_S,
+    )
+    with listener:
+        Server(config, ready).run(sockets=[listener])
