@@ -1,6 +1,6 @@
 """Every value of tests/data/kinematics.json, from independent implementations (dynars, dynasaur, NHTSA's Fortran, ...).
 
-The file's pulses begin at 20 ms and are not filtered. Rows without a tolerance are closed forms of the continuous pulse,
+The file's pulses begin at 20 ms and are not filtered. Rows without a tolerance are closed forms of continuous pulses,
 which samples at 1 kHz do not reach: they are met on fine samples.
 """
 
