@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import factorial, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +31,6 @@ FloatArray = NDArray[np.float64]
 # The running sum holds exp(+L t): a record is cut where that factor reaches exp(16), long before digits are lost.
 LARGEST_EXPONENT = 16.0
 TAYLOR_TERMS = 20
-
-# Impacts of a batch that are solved together.
-BLOCK = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +63,7 @@ def brain_angle_history(
     Parameters
     ----------
     angular_acceleration
-        Angular acceleration of the skull [rad/s^2], n x 3 or n x m x 3.
+        Angular acceleration of the skull [rad/s^2], n x 3 or n x 3 x m.
     sample_rate_hz
         Samples per second [Hz].
     oscillators
@@ -78,16 +76,17 @@ def brain_angle_history(
     """
     alpha = angular_acceleration
     angle = np.empty_like(alpha)
-    if alpha.ndim == 2:
-        _fill(alpha, angle, np.empty_like(alpha), np.empty_like(alpha), sample_rate_hz, oscillators)
-        return angle
-    # a block at a time, in two buffers that stay in the processor's cache
-    re = np.empty((alpha.shape[0], min(BLOCK, alpha.shape[1]), 3))
-    im = np.empty_like(re)
-    for first in range(0, alpha.shape[1], BLOCK):
-        block = slice(first, first + BLOCK)
-        width = alpha[:, block].shape[1]
-        _fill(alpha[:, block], angle[:, block], re[:, :width], im[:, :width], sample_rate_hz, oscillators)
+    angle[0] = 0.0
+    steps = alpha.shape[0] - 1
+    segment = _segment_length(oscillators, sample_rate_hz)
+    state: tuple[FloatArray, FloatArray] | None = None
+    for start in range(0, steps, segment):
+        stop = min(start + segment, steps)
+        tables = _tables(oscillators, sample_rate_hz, stop - start)
+        advance = _advance if alpha.ndim == 2 else _advance_block
+        re, im = advance(alpha[start : stop + 1], angle[start : stop + 1], state, tables)
+        if stop < steps:
+            state = _state_at_end(re, im, alpha[stop], tables, angle[stop])
     return angle
 
 
@@ -99,7 +98,7 @@ def peak_brain_angles(
     Parameters
     ----------
     angular_acceleration
-        Angular acceleration of the skull [rad/s^2], n x 3 or n x m x 3.
+        Angular acceleration of the skull [rad/s^2], n x 3 or n x 3 x m.
     sample_rate_hz
         Samples per second [Hz].
     oscillators
@@ -108,7 +107,7 @@ def peak_brain_angles(
     Returns
     -------
     tuple of ndarray
-        Peaks per axis (3 or m x 3) and of the resultant (scalar or m).
+        Peaks per axis (3 or 3 x m) and of the resultant (scalar or m).
     """
     angle = brain_angle_history(angular_acceleration, sample_rate_hz, oscillators)
     return largest_magnitude(angle), np.sqrt(largest(squared_norm(angle)))
@@ -118,72 +117,74 @@ def _segment_length(oscillators: Oscillators, sample_rate_hz: float) -> int:
     return max(1, int(LARGEST_EXPONENT / max(oscillators.decay_rate) * sample_rate_hz))
 
 
-def _fill(
-    alpha: FloatArray,
-    angle: FloatArray,
-    re: FloatArray,
-    im: FloatArray,
-    sample_rate_hz: float,
-    oscillators: Oscillators,
-) -> None:
-    """Fill `angle`, segment by segment; `re` and `im` are buffers of its shape."""
-    steps = alpha.shape[0] - 1
-    segment = _segment_length(oscillators, sample_rate_hz)
-    angle[0] = 0.0
-    state: tuple[FloatArray, FloatArray] | None = None
-    for start in range(0, steps, segment):
-        stop = min(start + segment, steps)
-        tables = _tables(oscillators, sample_rate_hz, stop - start)
-        span, buffers = slice(start, stop + 1), (re[start:stop], im[start:stop])
-        state = _advance(alpha[span], angle[span], buffers, state, tables)
-
-
 def _advance(
-    alpha: FloatArray,
-    angle: FloatArray,
-    buffers: tuple[FloatArray, FloatArray],
-    state: tuple[FloatArray, FloatArray] | None,
-    tables: _Tables,
+    alpha: FloatArray, angle: FloatArray, state: tuple[FloatArray, FloatArray] | None, tables: _Tables
 ) -> tuple[FloatArray, FloatArray]:
-    """Fill `angle` over one segment from `state`, (Re z, Im z) at its first sample, None at rest; return its last.
+    """Fill `angle` over one segment of one impact, from `state`, (Re z, Im z) at its first sample, None at rest.
 
-    With weights g_j and u_k = sum over j < k of g_j alpha_j, the state is z_k = exp(s t_k) u_k + c1 alpha_k.
+    With weights g_j and u_k = sum over j < k of g_j alpha_j, the state is z_k = exp(s t_k) u_k + c1 alpha_k, and the
+    angle its imaginary part. Returns u at the last sample.
     """
-    weight_re, weight_im, back_cos, back_sin = tables.spread(alpha.ndim)
-    c1_re, c1_im = tables.c1
-    past, now = alpha[:-1], angle[1:]
-    re = np.multiply(weight_re, past, out=buffers[0])
-    im = np.multiply(weight_im, past, out=buffers[1])
-    # the first sample of a segment has no share of c1: there the state is given
-    re[0] -= c1_re * past[0]
-    im[0] -= c1_im * past[0]
+    re = tables.weight_re * alpha[:-1]
+    im = tables.weight_im * alpha[:-1]
     if state is not None:
         re[0] += state[0]
         im[0] += state[1]
     accumulate(re)
     accumulate(im)
-    end_re = re[-1] * back_cos[-1] - im[-1] * back_sin[-1] + c1_re * alpha[-1]
-    re *= back_sin
-    im *= back_cos
-    np.multiply(alpha[1:], c1_im, out=now)
+    last = re[-1].copy(), im[-1].copy()
+    re *= tables.back_im
+    im *= tables.back_re
+    now = np.multiply(alpha[1:], tables.c1_im, out=angle[1:])
     now += re
     now += im
-    return end_re, angle[-1]
+    return last
 
 
-@dataclass(frozen=True, slots=True)
-class _Tables:
-    """What one segment needs: weights g_j = exp(-s t_j) (c1 + c0 exp(-s dt)), real and imaginary; exp(s t_k) of its
-    steps k = 1, 2, ..., likewise; c1, likewise."""
+def _advance_block(
+    alpha: FloatArray, angle: FloatArray, state: tuple[FloatArray, FloatArray] | None, tables: _Tables
+) -> tuple[FloatArray, FloatArray]:
+    """The same for a block of impacts, n x 3 x m: the same operations, but sample by sample and with Re and Im together,
+    so that the rows at work stay in the processor's cache."""
+    u = np.zeros((2, *alpha.shape[1:])) if state is None else np.stack(state)
+    share = np.empty_like(u)
+    share_re, share_im = share
+    weights = np.stack((tables.weight_re, tables.weight_im), axis=1)[..., None]
+    back = np.stack((tables.back_im, tables.back_re), axis=1)[..., None]
+    c1_im = tables.c1_im[:, None]
+    for weight, turn, past, following, now in zip(weights, back, alpha[:-1], alpha[1:], angle[1:], strict=True):
+        np.multiply(weight, past, out=share)
+        u += share
+        np.multiply(u, turn, out=share)
+        np.multiply(following, c1_im, out=now)
+        now += share_re
+        now += share_im
+    return u[0], u[1]
 
-    weights_and_back: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-    c1: tuple[NDArray[np.floating], NDArray[np.floating]]
 
-    def spread(self, ndim: int) -> tuple[FloatArray, ...]:
-        """The tables with axes for as many dimensions as the signal has."""
-        if ndim == 2:
-            return self.weights_and_back
-        return tuple(table[:, None, :] for table in self.weights_and_back)
+def _state_at_end(
+    re: FloatArray, im: FloatArray, alpha: FloatArray, tables: _Tables, angle: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(Re z, Im z) at a segment's last sample, where the next one starts."""
+    back_re, back_im, c1_re = tables.back_re[-1], tables.back_im[-1], tables.c1_re
+    if re.ndim == 2:
+        back_re, back_im, c1_re = back_re[:, None], back_im[:, None], c1_re[:, None]
+    return re * back_re - im * back_im + c1_re * alpha, angle
+
+
+class _Tables(NamedTuple):
+    """What one segment needs, steps x 3.
+
+    The weights g_j = exp(-s t_j) (c1 + c0 exp(-s dt)), the first without its share of c1, since there the state is
+    given; exp(s t_k) of the steps k = 1, 2, ...; and c1.
+    """
+
+    weight_re: FloatArray
+    weight_im: FloatArray
+    back_re: FloatArray
+    back_im: FloatArray
+    c1_re: FloatArray
+    c1_im: FloatArray
 
 
 @lru_cache(maxsize=64)
@@ -203,9 +204,11 @@ def _tables(oscillators: Oscillators, sample_rate_hz: float, steps: int) -> _Tab
     c0 = -(dt / wd) * (phi1 - phi2)
     t = np.arange(steps)[:, None] * dt
     weights = np.exp(-s * t) * (c1 + c0 * np.exp(-s * dt))
+    weights[0] = c0 * np.exp(-s * dt)
     back = np.exp(s * (t + dt))
+    tables = (weights.real, weights.imag, back.real, back.imag, c1.real, c1.imag)
     # laid out by component, as single impacts are
-    tables = tuple(np.asfortranarray(x) for x in (weights.real, weights.imag, back.real, back.imag))
-    for table in tables:
+    fixed = [np.asfortranarray(table, dtype=np.float64) for table in tables]
+    for table in fixed:
         table.flags.writeable = False
-    return _Tables((tables[0], tables[1], tables[2], tables[3]), (c1.real, c1.imag))
+    return _Tables(*fixed)

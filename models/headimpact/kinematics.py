@@ -19,9 +19,10 @@ STANDARD_GRAVITY = float(UNITS["standard_gravity_m_s2"])
 class HeadKinematics:
     """Motion of the head's centre of gravity in anatomical axes.
 
-    Arrays have time first and axes (x, y, z) last: n x 3 for one impact, n x m x 3 for a block of m impacts of equal
-    length and rate. x is anterior-posterior (rotation about it: coronal), y left-right (sagittal), z
-    inferior-superior (axial).
+    Arrays have time first and axes (x, y, z) second: n x 3 for one impact, n x 3 x m for a block of m impacts of equal
+    length and rate. (Impacts are last: what differs by axis then meets whole rows of equal work.) One impact is best
+    laid out component by component (Fortran order): maxima and sums over time are then contiguous. x is
+    anterior-posterior (rotation about it: coronal), y left-right (sagittal), z inferior-superior (axial).
 
     Parameters
     ----------
@@ -125,14 +126,14 @@ def largest(x: FloatArray) -> FloatArray:
 
 
 def squared_norm(x: FloatArray) -> FloatArray:
-    """Squared Euclidean norm over the last axis (x, y, z).
+    """Squared Euclidean norm over the axes (x, y, z), the second dimension.
 
     Written component by component: the same operations in the same order for one impact and for a block of many, so
     that both give the same bits.
     """
-    total = x[..., 0] * x[..., 0]
-    total += x[..., 1] * x[..., 1]
-    total += x[..., 2] * x[..., 2]
+    total = x[:, 0] * x[:, 0]
+    total += x[:, 1] * x[:, 1]
+    total += x[:, 2] * x[:, 2]
     return total
 
 
@@ -140,6 +141,11 @@ def largest_magnitude(x: FloatArray) -> FloatArray:
     """Maximum of the absolute value over time."""
     magnitude: FloatArray = np.maximum(-np.minimum.reduce(x, axis=0), largest(x))
     return magnitude
+
+
+def by_axis(constants: FloatArray, x: FloatArray) -> FloatArray:
+    """Three constants, one per axis, shaped to multiply values by axis: of one impact (3) or of a block (3 x m)."""
+    return constants if x.ndim < 3 else constants[:, None]
 
 
 def accumulate(x: FloatArray) -> FloatArray:

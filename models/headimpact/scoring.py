@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from headimpact.criteria import CRITERIA, Criterion, Evaluation, evaluate, missing_reason, present_signals
 from headimpact.criteria.extra import EXTRA_CRITERIA, ExtraCriterion
@@ -161,7 +162,7 @@ def _stacked(motions: Sequence[HeadKinematics]) -> HeadKinematics:
     def stack(name: str) -> FloatArray | None:
         if getattr(first, name) is None:
             return None
-        return np.stack([getattr(motion, name) for motion in motions], axis=1)
+        return np.stack([getattr(motion, name) for motion in motions], axis=2)
 
     return HeadKinematics(
         first.sample_rate_hz, stack("linear_acceleration_g"), stack("angular_velocity"), stack("angular_acceleration")
@@ -178,8 +179,7 @@ class _Table:
         self._missing = _missing_signals(evaluation.kinematics)
         values = _tabulated(evaluation, impacts)
         predictors = _linear_predictors(values, model, model.incidence_shift(incidence))
-        with np.errstate(over="ignore"):
-            probabilities = 1.0 / (1.0 + np.exp(predictors))
+        probabilities = expit(-predictors)
         self._values: list[list[list[float]]] = values.tolist()
         self._predictors: list[list[float]] = predictors.tolist()
         self._probabilities: list[list[float]] = probabilities.tolist()
@@ -257,7 +257,7 @@ def _tabulated(evaluation: Evaluation, impacts: int) -> FloatArray:
         found = evaluation.values.get(criterion.key)
         if found is not None:
             if criterion.components == 3:
-                values[:, column] = found
+                values[:, column] = found.T
             else:
                 values[:, column, 0] = found
     return values
@@ -293,8 +293,8 @@ def _angle_rows(history: FloatArray | None, impacts: int) -> tuple[list[float], 
     if history is None:
         return None
     resultants = _rows(np.sqrt(largest(squared_norm(history))), impacts)
-    samples = np.abs(history).argmax(axis=0).tolist()
-    return resultants, [samples] if history.ndim == 2 else samples
+    samples = np.abs(history).argmax(axis=0)
+    return resultants, [samples.tolist()] if history.ndim == 2 else samples.T.tolist()
 
 
 def _extra_score(extra: ExtraCriterion, kinematics: HeadKinematics) -> CriterionScore:

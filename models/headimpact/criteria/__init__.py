@@ -119,12 +119,12 @@ def evaluate(kinematics: HeadKinematics) -> Evaluation:
     Parameters
     ----------
     kinematics
-        Motion of one impact (n x 3) or of a block of m impacts (n x m x 3).
+        Motion of one impact (n x 3) or of a block of m impacts (n x 3 x m).
 
     Returns
     -------
     Evaluation
-        `values` by key, shaped () or (3,) for one impact, (m,) or (m, 3) for a block; a criterion whose signals are
+        `values` by key, shaped () or (3,) for one impact, (m,) or (3, m) for a block; a criterion whose signals are
         absent is absent. `windows` of HIC and RIC as sample numbers; `brain_angle` the history at the samples [rad].
     """
     evaluation = Evaluation(kinematics)

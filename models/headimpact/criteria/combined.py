@@ -6,7 +6,7 @@ import numpy as np
 
 from headimpact.brain import INERTIA_KG_M2
 from headimpact.criteria.windows import FloatArray
-from headimpact.kinematics import STANDARD_GRAVITY, HeadKinematics, largest, running_integral
+from headimpact.kinematics import STANDARD_GRAVITY, HeadKinematics, by_axis, largest, running_integral
 from headimpact.published import CRITERIA_CONSTANTS
 
 HEAD_MASS_KG = float(CRITERIA_CONSTANTS["hip"]["head_mass_kg"])
@@ -28,10 +28,10 @@ def head_impact_power(kinematics: HeadKinematics) -> tuple[FloatArray, FloatArra
     power *= HEAD_MASS_KG * STANDARD_GRAVITY**2
     rotational = running_integral(alpha, kinematics.sample_rate_hz)
     rotational *= alpha
-    rotational *= INERTIA_KG_M2
+    rotational *= by_axis(INERTIA_KG_M2, rotational)
     power += rotational
-    total = power[..., 0] + power[..., 1]
-    total += power[..., 2]
+    total = power[:, 0] + power[:, 1]
+    total += power[:, 2]
     return largest(total), largest(power)
 
 

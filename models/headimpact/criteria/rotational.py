@@ -1,7 +1,7 @@
 """Criteria of the head's rotation: Laksari et al. 2020, supplementary section "Injury criteria".
 
-Every function takes kinematics of one impact (n x 3) or of a block (n x m x 3) and returns one value, or one per axis
-(last axis), for each impact.
+Every function takes kinematics of one impact (n x 3) or of a block (n x 3 x m) and returns one value (or m), or one per
+axis (3 or 3 x m).
 """
 
 from __future__ import annotations
@@ -38,8 +38,11 @@ def bric(kinematics: HeadKinematics, critical: FloatArray = CRITICAL_ANGULAR_VEL
     critical
         Critical angular velocities, x, y, z [rad/s]; the paper's unless given.
     """
-    ratio = kinematics.peak_angular_velocity_components / critical
-    return np.sqrt(ratio[..., 0] ** 2 + ratio[..., 1] ** 2 + ratio[..., 2] ** 2)
+    peak = kinematics.peak_angular_velocity_components
+    ratio = peak / (critical if peak.ndim == 1 else critical[:, None])
+    ratio *= ratio
+    total: FloatArray = ratio[0] + ratio[1] + ratio[2]
+    return np.sqrt(total)
 
 
 def ric(kinematics: HeadKinematics) -> tuple[FloatArray, IntArray, IntArray]:

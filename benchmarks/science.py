@@ -1,0 +1,148 @@
+"""The science against its peers, side by side in one run.
+
+    uv run --with eqsig==1.2.17 --with dynars==1.1.0 python benchmarks/science.py
+
+Ratios are the peer's process CPU time over ours, the median over rounds in turn, with the lowest and highest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import straightforward
+from alternate import Comparison, compare
+from dynars import injury
+from eqsig.sdof import nigam_and_jennings_response
+from waves import fresh, impact
+
+from headimpact.brain import BRAIN, peak_brain_angles
+from headimpact.criteria import CRITERIA, evaluate
+from headimpact.criteria.windows import window_maxima
+from headimpact.kinematics import HeadKinematics
+from headimpact.preparation import Preparation
+from headimpact.risk import LAKSARI_2020
+from headimpact.scoring import score, score_many
+
+RATE = 1000.0
+
+
+def brain_angles_batch() -> Comparison:
+    """1000 impacts of 100 samples; eqsig solves one oscillator of one record a call."""
+    impacts = [impact(seed) for seed in range(1000)]
+    alpha = np.stack([k.angular_acceleration for k in impacts], axis=2)
+    wn = np.sqrt(BRAIN.natural_frequency_squared)
+    periods, ratios = 2 * np.pi / wn, np.array(BRAIN.decay_rate) / wn
+    some = alpha[:, :, :10]
+
+    def peer():
+        return [
+            [
+                np.abs(nigam_and_jennings_response(some[:, i, m], 1 / RATE, periods[i : i + 1], ratios[i])[0]).max()
+                for i in range(3)
+            ]
+            for m in range(some.shape[2])
+        ]
+
+    ours, _ = peak_brain_angles(alpha, RATE)
+    # eqsig rounds 2 pi to eight digits, which bounds how far the two can agree
+    np.testing.assert_allclose(ours.T[:10], peer(), rtol=1e-6)
+    found = compare(lambda: peak_brain_angles(alpha, RATE), peer, calls=(5, 1))
+    return impacts_scaled(found, 1000 / some.shape[2])
+
+
+def impacts_scaled(found: Comparison, factor: float) -> Comparison:
+    """The peer ran on a share of the impacts: its cost is proportional to their number."""
+    return Comparison(
+        found.ours, found.peer * factor, found.ratio * factor, found.lowest * factor, found.highest * factor
+    )
+
+
+def hic_batch() -> Comparison:
+    """HIC15 and HIC36 of 1000 impacts of 100 samples at 1 kHz."""
+    resultants = np.stack([impact(seed).linear_acceleration_resultant_g for seed in range(1000)], axis=1)
+    rows = [np.ascontiguousarray(column) for column in resultants.T]
+
+    def peer():
+        return [(injury.hic15(row, 1 / RATE), injury.hic36(row, 1 / RATE)) for row in rows]
+
+    (hic15, _, _), (hic36, _, _) = window_maxima(resultants, RATE, (0.015, 0.036))
+    np.testing.assert_allclose(
+        np.stack([hic15, hic36], axis=1), [[_value(x) for x in pair] for pair in peer()], rtol=1e-9
+    )
+    return compare(lambda: window_maxima(resultants, RATE, (0.015, 0.036)), peer, calls=(3, 3))
+
+
+def hic_high_rate() -> Comparison:
+    """HIC15 and HIC36 of one record of 2000 samples at 20 kHz."""
+    resultant = impact(3, 2000, 20_000.0).linear_acceleration_resultant_g
+
+    def peer():
+        return injury.hic15(resultant, 1 / 20_000), injury.hic36(resultant, 1 / 20_000)
+
+    found = [value for value, _, _ in window_maxima(resultant, 20_000.0, (0.015, 0.036))]
+    np.testing.assert_allclose(found, [_value(x) for x in peer()], rtol=1e-9)
+    return compare(lambda: window_maxima(resultant, 20_000.0, (0.015, 0.036)), peer, calls=(50, 20))
+
+
+def _value(found: object) -> float:
+    """dynars gives a value, or a value with its window."""
+    return float(found[0]) if isinstance(found, tuple) else float(found)
+
+
+def prepared(k: HeadKinematics) -> Preparation:
+    """Kinematics as the preparation of a recording leaves them."""
+    return Preparation(fresh(k), (), (), "supplied", "five_point_stencil", pre_trigger_known=False)
+
+
+def one_impact() -> Comparison:
+    """All criteria and probabilities of one impact; ours also writes the quality notes and the score object."""
+    k = impact(7)
+    a, w, alpha = k.linear_acceleration_g, k.angular_velocity, k.angular_acceleration
+    ours, peer = score(prepared(k)), straightforward.criteria(a, w, alpha, RATE)
+    for criterion in CRITERIA:
+        np.testing.assert_allclose(ours.criteria[criterion.key].value, peer[criterion.key], rtol=1e-9)
+    return compare(
+        lambda: score(prepared(k)),
+        lambda: straightforward.probabilities(straightforward.criteria(a, w, alpha, RATE)),
+        calls=(100, 10),
+    )
+
+
+def batch() -> tuple[float, float]:
+    """Impacts per CPU second in batch: values and probabilities as arrays, and whole score objects."""
+    impacts = [impact(seed) for seed in range(1024)]
+    b0, b = LAKSARI_2020.coefficients
+    blocks = [
+        HeadKinematics(
+            RATE,
+            *(
+                np.stack([getattr(k, name) for k in impacts[i : i + 256]], axis=2)
+                for name in ("linear_acceleration_g", "angular_velocity", "angular_acceleration")
+            ),
+        )
+        for i in range(0, len(impacts), 256)
+    ]
+
+    def arrays():
+        for block in blocks:
+            values = evaluate(fresh(block)).values
+            for row, criterion in enumerate(CRITERIA):
+                found = values[criterion.key].reshape(-1, 256)
+                1 / (1 + np.exp(b0[row] + b[row, : len(found)] @ found))
+
+    both = compare(arrays, lambda: score_many([prepared(k) for k in impacts]), calls=(1, 1))
+    return len(impacts) / both.ours, len(impacts) / both.peer
+
+
+def main() -> None:
+    print("| part | peer | ours | peer | ratio, median (range) | to reach |")
+    print("|---|---|---|---|---|---|")
+    print(brain_angles_batch().row("brain angles, 1000 x 100 samples", "eqsig 1.2.17", "1500"), flush=True)
+    print(hic_batch().row("HIC15 + HIC36, 1000 x 100 samples, 1 kHz", "dynars 1.1.0", "1.2"), flush=True)
+    print(hic_high_rate().row("HIC15 + HIC36, 2000 samples, 20 kHz", "dynars 1.1.0", "2.5"), flush=True)
+    print(one_impact().row("all criteria and probabilities, one impact", "SciPy code", "30"), flush=True)
+    arrays, objects = batch()
+    print(f"\nIn batch: {arrays:,.0f} impacts per CPU second as arrays, {objects:,.0f} as score objects.")
+
+
+if __name__ == "__main__":
+    main()
