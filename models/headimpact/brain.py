@@ -144,8 +144,10 @@ def _advance(
 def _advance_block(
     alpha: FloatArray, angle: FloatArray, state: tuple[FloatArray, FloatArray] | None, tables: _Tables
 ) -> tuple[FloatArray, FloatArray]:
-    """The same for a block of impacts, n x 3 x m: the same operations, but sample by sample and with Re and Im together,
-    so that the rows at work stay in the processor's cache."""
+    """The same for a block of impacts, n x 3 x m: the same operations, but sample by sample and with Re and Im as one.
+
+    So the rows at work stay in the processor's cache.
+    """
     u = np.zeros((2, *alpha.shape[1:])) if state is None else np.stack(state)
     share = np.empty_like(u)
     share_re, share_im = share
