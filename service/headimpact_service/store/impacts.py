@@ -100,6 +100,7 @@ _SAME_EVENT = select(impacts.c.id).where(
 _INSERT_IMPACT = Prepared(insert(impacts), [column.name for column in impacts.c])
 _INSERT_REVISION = Prepared(insert(impact_revisions), [column.name for column in impact_revisions.c])
 _INSERT_SCORE = Prepared(insert(scores), [column.name for column in scores.c])
+_UPDATE = update(impacts).where(impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact"))
 _SUPERSEDE = update(impact_revisions).where(
     impact_revisions.c.impact_id == bindparam("impact"), impact_revisions.c.revision == bindparam("before")
 )
@@ -246,19 +247,17 @@ def correct(
         return Outcome("unchanged", present)
     require_revision(present.revision, if_match)
     known = _look_up(conn, data_set_id, new)
-    row = _members(conn, data_set_id, new, known) | _name(data_set_id, present, new, known)
+    changed = _name(data_set_id, present, new, known) | _members(conn, data_set_id, new, known)
     now = next_change(conn, impacts, data_set_id)
-    row |= {
-        "data_set_id": data_set_id,
-        "id": impact_id,
+    changed |= {
+        "duplicate_of": find_same_content(conn, data_set_id, new.input_digest, exclude=impact_id),
         "revision": present.revision + 1,
         "score_number": next_number(conn, impact_id),
         "updated_at": now,
     }
-    of_impact = (impacts.c.data_set_id == data_set_id, impacts.c.id == impact_id)
-    conn.execute(update(impacts).where(*of_impact), row)
+    conn.execute(_UPDATE, changed | {"of_data_set": data_set_id, "impact": impact_id})
     conn.execute(_SUPERSEDE, {"impact": impact_id, "before": present.revision, "superseded_at": now})
-    _insert_revision(conn, new, row, now)
+    _insert_revision(conn, new, changed | {"data_set_id": data_set_id, "id": impact_id}, now)
     return Outcome("corrected", _require(conn, data_set_id, impact_id))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 from alembic import command
@@ -12,6 +13,9 @@ from alembic.util import CommandError
 from sqlalchemy import Connection, Engine, text
 
 import headimpact_service
+
+_ONE_AT_A_TIME = threading.Lock()
+"""Alembic keeps the migration that runs in a module's variables."""
 
 
 class MigrationError(RuntimeError):
@@ -36,7 +40,7 @@ def upgrade(engine: Engine, revision: str = "head") -> None:
     config = Config()
     config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
-    with engine.begin() as conn:
+    with _ONE_AT_A_TIME, engine.begin() as conn:
         _lock(conn)
         _refuse_newer(conn, ScriptDirectory.from_config(config))
         config.attributes["connection"] = conn

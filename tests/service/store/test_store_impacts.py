@@ -1,0 +1,532 @@
+"""Impacts are stored once, corrected with their past kept, and deleted down to a tombstone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from sqlalchemy import func, select
+
+from headimpact_service.errors import Problem
+from headimpact_service.store import athletes, devices, ids, impacts, keys, scores
+from headimpact_service.store.athletes import AthleteFields
+from headimpact_service.store.database import Database
+from headimpact_service.store.devices import DeviceFields
+from headimpact_service.store.impacts import Impact, ImpactFilters, NewImpact, Outcome
+from headimpact_service.store.keys import KeyRow
+from headimpact_service.store.tables import impact_revisions
+from headimpact_service.store.tables import scores as score_table
+
+
+def add(database: Database, data_set: bytes, new: NewImpact, **options: bool) -> Outcome:
+    return database.write(lambda conn: impacts.add(conn, data_set, new, **options))
+
+
+def get(database: Database, data_set: bytes, impact_id: bytes) -> Impact | None:
+    with database.read() as conn:
+        return impacts.get(conn, data_set, impact_id)
+
+
+def listed(database: Database, data_set: bytes, filters: ImpactFilters | None = None, **options) -> list[Impact]:
+    with database.read() as conn:
+        return list(impacts.page(conn, data_set, filters, **options).rows)
+
+
+class TestAdd:
+    def test_what_is_answered_is_what_is_stored(self, database, key: KeyRow, make_impact) -> None:
+        new = make_impact(key_id=key.id)
+        outcome = add(database, key.data_set_id, new)
+        assert outcome.status == "created"
+        assert outcome.impact == get(database, key.data_set_id, outcome.impact.id)
+        assert outcome.impact.score.values["bam"] == (0.1, 1 / 3, 1e-7)
+        assert outcome.impact.score.quality_codes == ("record_truncated", "low_sample_rate")
+        with database.read() as conn:
+            (kept,) = impacts.revisions(conn, key.data_set_id, outcome.impact.id)
+            assert impacts.trace(conn, key.data_set_id, outcome.impact.id).signals == new.trace
+        assert (kept.content_digest, kept.key_id, kept.document) == (new.content_digest, key.id, new.document)
+
+    def test_an_impact_that_says_nothing_of_itself_is_stored(self, database, data_set, make_impact, make_score) -> None:
+        nothing = dict.fromkeys(
+            ("external_id", "athlete_external_id", "device_serial", "occurred_at", "session_id", "activity")
+            + ("sport", "position", "context")
+        )
+        unscorable = make_score(state="unscorable", values={}, probabilities={}, quality_codes=())
+        new = make_impact(**nothing, score=unscorable)
+        first, second = add(database, data_set, new).impact, add(database, data_set, new).impact
+        assert first == get(database, data_set, first.id)
+        assert first.score.values["bam"] is None
+        assert second.duplicate_of == first.id
+
+    def test_a_redelivery_is_unchanged(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact())
+        again = add(database, data_set, make_impact())
+        assert again == Outcome("unchanged", first.impact)
+
+    def test_other_content_under_the_same_external_id_conflicts(self, database, data_set, make_impact) -> None:
+        add(database, data_set, make_impact())
+        with pytest.raises(Problem) as caught:
+            add(database, data_set, make_impact("other"))
+        assert caught.value.slug == "external-id-conflict"
+        assert len(listed(database, data_set)) == 1
+
+    def test_the_same_external_id_is_free_in_another_data_set(self, database, data_set, make_impact) -> None:
+        other = database.write(lambda conn: keys.create_key(conn, "Other", ["all"]))[0].data_set_id
+        first = add(database, data_set, make_impact()).impact
+        second = add(database, other, make_impact())
+        assert second.status == "created"
+        assert get(database, other, first.id) is None
+        with database.read() as conn:
+            assert impacts.trace(conn, other, first.id) is None
+            assert impacts.revisions(conn, other, first.id) == []
+
+    def test_an_athlete_and_a_device_are_made_on_first_sight_only(self, database, data_set, make_impact) -> None:
+        one = add(database, data_set, make_impact(external_id="1")).impact
+        two = add(database, data_set, make_impact(external_id="2")).impact
+        assert (one.athlete_id, one.device_id) == (two.athlete_id, two.device_id)
+        with database.read() as conn:
+            assert athletes.find(conn, data_set, "p-17").id == one.athlete_id
+            assert devices.get(conn, data_set, "mg-0042").id == one.device_id
+
+    def test_an_athlete_given_by_id_is_answered_with_the_external_id(self, database, data_set, make_impact) -> None:
+        athlete = database.write(lambda conn: athletes.create(conn, data_set, AthleteFields(external_id="x")))
+        made = add(database, data_set, make_impact(athlete_id=athlete.id, athlete_external_id=None)).impact
+        assert (made.athlete_id, made.athlete_external_id) == (athlete.id, "x")
+        assert made == get(database, data_set, made.id)
+
+    def test_an_athlete_id_that_is_none_of_the_data_sets_stores_nothing(self, database, data_set, make_impact) -> None:
+        other = database.write(lambda conn: keys.create_key(conn, "Other", ["all"]))[0].data_set_id
+        theirs = database.write(lambda conn: athletes.create(conn, other, AthleteFields()))
+        for athlete_id in (ids.new(), theirs.id):
+            with pytest.raises(Problem) as caught:
+                add(database, data_set, make_impact(athlete_id=athlete_id, athlete_external_id=None))
+            assert caught.value.slug == "invalid-payload"
+            assert caught.value.errors[0].pointer == "/athlete/id"
+        assert listed(database, data_set) == []
+
+    def test_the_same_content_is_marked_as_a_duplicate(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact(external_id="1")).impact
+        second = add(database, data_set, make_impact(external_id="2")).impact
+        assert (first.duplicate_of, second.duplicate_of) == (None, first.id)
+        digest = make_impact().input_digest
+        with database.read() as conn:
+            assert impacts.find_same_content(conn, data_set, digest) == first.id
+            assert impacts.find_same_content(conn, data_set, digest, first.id) == second.id
+            assert impacts.find_same_content(conn, data_set, b"0" * 32) is None
+
+    def test_an_import_of_the_same_event_is_unchanged_whatever_its_name(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact(external_id="a.csv/1"))
+        again = add(database, data_set, make_impact(external_id="b.csv/1"), same_event_is_unchanged=True)
+        assert again == Outcome("unchanged", first.impact)
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"athlete_external_id": "p-18"},
+            {"athlete_external_id": None},
+            {"occurred_at": None},
+            {"occurred_at": datetime(2026, 11, 20, tzinfo=UTC)},
+            {"input_digest": b"9" * 32},
+        ],
+    )
+    def test_an_import_of_another_event_is_created(self, database, data_set, make_impact, change) -> None:
+        add(database, data_set, make_impact(external_id="1"))
+        new = make_impact(external_id="2", **change)
+        assert add(database, data_set, new, same_event_is_unchanged=True).status == "created"
+
+    def test_a_nameless_import_is_found_by_its_content(self, database, data_set, make_impact) -> None:
+        new = make_impact(external_id=None, athlete_external_id=None, occurred_at=None)
+        add(database, data_set, new)
+        assert add(database, data_set, new, same_event_is_unchanged=True).status == "unchanged"
+
+
+class TestCorrect:
+    def correct(self, database, data_set, impact_id, new, if_match=None) -> Outcome:
+        return database.write(lambda conn: impacts.correct(conn, data_set, impact_id, new, if_match=if_match))
+
+    def test_a_correction_keeps_the_revision_before(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        corrected = self.correct(database, data_set, first.id, make_impact("new", athlete_external_id="p-18"), 1)
+        assert corrected.status == "corrected"
+        assert corrected.impact == get(database, data_set, first.id)
+        assert (corrected.impact.revision, corrected.impact.athlete_external_id) == (2, "p-18")
+        assert corrected.impact.created_at == first.created_at < corrected.impact.updated_at
+        with database.read() as conn:
+            old, new = impacts.revisions(conn, data_set, first.id)
+            assert impacts.trace(conn, data_set, first.id, 1).signals == make_impact().trace
+            assert impacts.trace(conn, data_set, first.id).signals == make_impact("new").trace
+            assert impacts.trace(conn, data_set, first.id, 3) is None
+            assert [each.revision for each in scores.list_all(conn, data_set, first.id)] == [1, 2]
+        assert (old.athlete_id, old.superseded_at, new.superseded_at) == (first.athlete_id, new.created_at, None)
+
+    def test_a_redelivery_of_any_kept_revision_is_unchanged(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        present = self.correct(database, data_set, first.id, make_impact("new")).impact
+        assert add(database, data_set, make_impact()) == Outcome("unchanged", present)
+        assert add(database, data_set, make_impact("new")) == Outcome("unchanged", present)
+
+    def test_a_correction_sent_twice_was_done_once(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        self.correct(database, data_set, first.id, make_impact("new"), 1)
+        assert self.correct(database, data_set, first.id, make_impact("new"), 1).status == "unchanged"
+
+    def test_a_correction_of_another_revision_is_refused(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        with pytest.raises(Problem) as caught:
+            self.correct(database, data_set, first.id, make_impact("new", athlete_external_id="never-seen"), 2)
+        assert caught.value.slug == "precondition-failed"
+        assert get(database, data_set, first.id) == first
+        with database.read() as conn:
+            assert athletes.find(conn, data_set, "never-seen") is None
+
+    def test_what_is_not_there_cannot_be_corrected(self, database, data_set, make_impact) -> None:
+        with pytest.raises(Problem) as caught:
+            self.correct(database, data_set, ids.new(), make_impact())
+        assert caught.value.slug == "not-found"
+
+    def test_a_name_is_kept_and_cannot_be_changed(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        kept = self.correct(database, data_set, first.id, make_impact("new", external_id=None)).impact
+        assert kept.external_id == "event-1"
+        with pytest.raises(Problem) as caught:
+            self.correct(database, data_set, first.id, make_impact("newer", external_id="event-2"))
+        assert caught.value.slug == "conflict"
+
+    def test_a_nameless_impact_gets_a_free_name_only(self, database, data_set, make_impact) -> None:
+        add(database, data_set, make_impact())
+        nameless = add(database, data_set, make_impact("x", external_id=None)).impact
+        with pytest.raises(Problem) as caught:
+            self.correct(database, data_set, nameless.id, make_impact("y"))
+        assert caught.value.slug == "external-id-conflict"
+        named = self.correct(database, data_set, nameless.id, make_impact("y", external_id="event-2"))
+        assert add(database, data_set, make_impact("y", external_id="event-2")) == Outcome("unchanged", named.impact)
+
+    def test_a_correction_finds_the_duplicates_of_its_new_content(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        second = add(database, data_set, make_impact("other", external_id="2")).impact
+        corrected = self.correct(database, data_set, second.id, make_impact(external_id="2")).impact
+        assert (second.duplicate_of, corrected.duplicate_of) == (None, first.id)
+
+
+class TestDelete:
+    def test_a_tombstone_says_only_that_something_was_here(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        tomb = database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        assert get(database, data_set, first.id) is None
+        assert (tomb.id, tomb.external_id, tomb.athlete_id) == (first.id, first.external_id, first.athlete_id)
+        assert (tomb.document, tomb.score, tomb.occurred_at, tomb.session_id, tomb.context) == (None,) * 5
+        assert tomb.deleted_at == tomb.updated_at > first.updated_at
+        with database.read() as conn:
+            assert impacts.get_any(conn, data_set, first.id) == tomb
+            for table in (impact_revisions, score_table):
+                assert conn.execute(select(func.count()).select_from(table)).scalar() == 0
+
+    def test_a_redelivery_after_a_deletion_is_refused(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        with pytest.raises(Problem) as caught:
+            add(database, data_set, make_impact())
+        assert caught.value.slug == "impact-deleted"
+
+    def test_only_the_present_revision_is_deleted(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        with pytest.raises(Problem) as caught:
+            database.write(lambda conn: impacts.delete(conn, data_set, first.id, if_match=2))
+        assert caught.value.slug == "precondition-failed"
+
+    def test_a_second_deletion_finds_nothing(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        with pytest.raises(Problem) as caught:
+            database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        assert caught.value.slug == "not-found"
+
+
+class TestPage:
+    START = datetime(2026, 1, 1, tzinfo=UTC)
+
+    @pytest.fixture
+    def seven(self, database, data_set, make_impact, make_score) -> list[Impact]:
+        made = []
+        for number in range(7):
+            new = make_impact(
+                external_id=f"e{number}",
+                athlete_external_id=f"p{number % 2}",
+                device_serial=f"d{number % 3}",
+                session_id=f"s{number % 2}",
+                occurred_at=self.START + timedelta(hours=number),
+                score=make_score(
+                    quality_codes=("clipped",) if number == 3 else ("clipped_a_bit",),
+                    probabilities={"bam": number / 10},
+                ),
+            )
+            made.append(add(database, data_set, new).impact)
+        return made
+
+    def test_pages_run_newest_first_to_the_end(self, database, data_set, seven) -> None:
+        after, seen = None, []
+        with database.read() as conn:
+            while True:
+                page = impacts.page(conn, data_set, limit=3, after=after)
+                seen += page.rows
+                after = page.next
+                if after is None:
+                    break
+        assert seen == seven[::-1]
+
+    def test_a_page_that_is_full_and_last_says_so(self, database, data_set, seven) -> None:
+        with database.read() as conn:
+            assert impacts.page(conn, data_set, limit=7).next is None
+
+    @pytest.mark.parametrize(
+        ("filters", "numbers"),
+        [
+            ({"external_id": "e4"}, [4]),
+            ({"external_id": "none"}, []),
+            ({"device_serial": "d1"}, [4, 1]),
+            ({"session_id": "s1"}, [5, 3, 1]),
+            ({"occurred_from": START + timedelta(hours=5)}, [6, 5]),
+            ({"occurred_to": START + timedelta(hours=2)}, [1, 0]),
+            ({"quality_code": "clipped"}, [3]),
+            ({"quality_code": "%"}, []),
+            ({"min_probability": ("bam", 0.5)}, [6, 5]),
+            ({"session_id": "s0", "device_serial": "d0"}, [6, 0]),
+        ],
+    )
+    def test_filters_hold_together(self, database, data_set, seven, filters, numbers) -> None:
+        rows = listed(database, data_set, ImpactFilters(**filters))
+        assert [row.external_id for row in rows] == [f"e{number}" for number in numbers]
+
+    def test_an_athletes_impacts_are_found_by_index(self, database, data_set, seven) -> None:
+        rows = listed(database, data_set, ImpactFilters(athlete_id=seven[1].athlete_id))
+        assert rows == [seven[5], seven[3], seven[1]]
+
+    def test_deleted_impacts_are_listed_only_by_change(self, database, data_set, seven) -> None:
+        tomb = database.write(lambda conn: impacts.delete(conn, data_set, seven[2].id))
+        assert seven[2].id not in {row.id for row in listed(database, data_set)}
+        changes = listed(database, data_set, updated_since=self.START)
+        assert changes == [*seven[:2], *seven[3:], tomb]
+
+    def test_a_tombstone_passes_the_filters_that_it_has_forgotten(self, database, data_set, seven) -> None:
+        tomb = database.write(lambda conn: impacts.delete(conn, data_set, seven[2].id))
+        by_session = listed(database, data_set, ImpactFilters(session_id="s1"), updated_since=self.START)
+        of_other = ImpactFilters(athlete_id=seven[1].athlete_id)
+        assert by_session[-1] == tomb
+        assert tomb not in listed(database, data_set, of_other, updated_since=self.START)
+        assert listed(database, data_set, ImpactFilters(session_id="s1")) == [seven[5], seven[3], seven[1]]
+
+    def test_changes_since_an_instant_begin_with_it(self, database, data_set, seven) -> None:
+        assert listed(database, data_set, updated_since=seven[4].updated_at) == seven[4:]
+
+
+class TestScores:
+    def add_score(self, database, data_set, impact_id, new, **options):
+        return database.write(lambda conn: scores.add(conn, data_set, impact_id, new, **options))
+
+    def test_another_models_score_stands_beside_the_first(self, database, data_set, make_impact, make_score) -> None:
+        first = add(database, data_set, make_impact()).impact
+        score, made = self.add_score(database, data_set, first.id, make_score(model="ours-2"))
+        assert made
+        assert (score.number, score.revision) == (2, 1)
+        assert get(database, data_set, first.id) == first
+        with database.read() as conn:
+            assert scores.list_all(conn, data_set, first.id) == [first.score, score]
+
+    def test_the_same_score_is_stored_once(self, database, data_set, make_impact, make_score) -> None:
+        first = add(database, data_set, make_impact()).impact
+        score, _ = self.add_score(database, data_set, first.id, make_score(model="ours-2"))
+        assert self.add_score(database, data_set, first.id, make_score(model="ours-2")) == (score, False)
+        assert self.add_score(database, data_set, first.id, make_score(model="ours-2", incidence=0.01))[1]
+
+    def test_a_score_can_be_made_the_one_that_stands(self, database, data_set, make_impact, make_score) -> None:
+        first = add(database, data_set, make_impact()).impact
+        score, _ = self.add_score(database, data_set, first.id, make_score(model="ours-2"), make_current=True)
+        present = get(database, data_set, first.id)
+        assert present.score == score
+        assert present.updated_at > first.updated_at
+
+    def test_a_score_of_nothing_is_refused(self, database, data_set, make_score) -> None:
+        with pytest.raises(Problem) as caught:
+            self.add_score(database, data_set, ids.new(), make_score())
+        assert caught.value.slug == "not-found"
+
+    def test_a_criterion_without_columns_is_a_mistake(self, database, data_set, make_impact, make_score) -> None:
+        with pytest.raises(KeyError):
+            add(database, data_set, make_impact(score=make_score(values={"new_criterion": 1.0})))
+        assert listed(database, data_set) == []
+
+
+class TestErase:
+    def test_an_erased_athlete_leaves_nothing_in_the_file(self, database, data_set, make_impact, tmp_path) -> None:
+        marked = make_impact("secret-content", external_id="secret-impact", athlete_external_id="secret-athlete")
+        marked = replace(marked, session_id="secret-session", device_serial="mg-1")
+        mine = add(database, data_set, marked).impact
+        other = add(database, data_set, make_impact()).impact
+        gone = database.write(lambda conn: athletes.erase(conn, data_set, mine.athlete_id))
+        assert gone.deleted_at is not None
+        assert gone.external_id is None
+        with database.read() as conn:
+            assert athletes.get(conn, data_set, mine.athlete_id) is None
+            assert athletes.page(conn, data_set, updated_since=mine.created_at).rows[-1] == gone
+            assert impacts.get_any(conn, data_set, mine.id).external_id is None
+        assert listed(database, data_set) == [other]
+        database.checkpoint()
+        raw = b"".join(file.read_bytes() for file in tmp_path.iterdir())
+        assert b"secret" not in raw
+        assert marked.trace not in raw
+        assert b"event-1" in raw
+
+    def test_an_erased_impact_is_not_brought_back_by_a_redelivery(self, database, data_set, make_impact) -> None:
+        mine = add(database, data_set, make_impact()).impact
+        database.write(lambda conn: athletes.erase(conn, data_set, mine.athlete_id))
+        with pytest.raises(Problem) as caught:
+            add(database, data_set, make_impact())
+        assert caught.value.slug == "impact-deleted"
+
+    def test_impacts_deleted_before_lose_their_names_too(self, database, data_set, make_impact) -> None:
+        mine = add(database, data_set, make_impact()).impact
+        database.write(lambda conn: impacts.delete(conn, data_set, mine.id))
+        database.write(lambda conn: athletes.erase(conn, data_set, mine.athlete_id))
+        with database.read() as conn:
+            assert impacts.get_any(conn, data_set, mine.id).external_id is None
+
+    def test_revisions_that_were_corrected_to_another_athlete_go_too(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        moved = make_impact("new", athlete_external_id="p-18")
+        present = database.write(lambda conn: impacts.correct(conn, data_set, first.id, moved)).impact
+        database.write(lambda conn: athletes.erase(conn, data_set, first.athlete_id))
+        assert get(database, data_set, first.id) == present
+        with database.read() as conn:
+            assert [each.revision for each in impacts.revisions(conn, data_set, first.id)] == [2]
+            assert scores.list_all(conn, data_set, first.id) == [present.score]
+
+    def test_many_impacts_get_as_many_instants(self, database, data_set, make_impact) -> None:
+        made = [add(database, data_set, make_impact(external_id=str(number))).impact for number in range(20)]
+        database.write(lambda conn: athletes.erase(conn, data_set, made[0].athlete_id))
+        tombs = listed(database, data_set, updated_since=made[0].updated_at)
+        assert len({tomb.updated_at for tomb in tombs}) == len(tombs) == 20
+        assert {tomb.id for tomb in tombs} == {impact.id for impact in made}
+
+
+class TestAthletes:
+    FIELDS = AthleteFields(
+        external_id="p-1", tags=("a", "b"), sport="hockey", level="u18", position="C", sex="female", birth_year=2009,
+        time_zone="Europe/Zurich", consent="granted",
+    )  # fmt: skip
+
+    def create(self, database, data_set, new=FIELDS):
+        return database.write(lambda conn: athletes.create(conn, data_set, new))
+
+    def patch(self, database, data_set, athlete_id, changes, **options):
+        return database.write(lambda conn: athletes.patch(conn, data_set, athlete_id, changes, **options))
+
+    def test_an_athlete_is_read_back(self, database, data_set) -> None:
+        made = self.create(database, data_set)
+        with database.read() as conn:
+            assert athletes.get(conn, data_set, made.id) == made == athletes.find(conn, data_set, "p-1")
+            assert athletes.page(conn, data_set, external_id="p-1").rows == (made,)
+            assert athletes.page(conn, data_set, external_id="p-2").rows == ()
+
+    def test_a_taken_external_id_conflicts(self, database, data_set) -> None:
+        self.create(database, data_set)
+        other = self.create(database, data_set, AthleteFields(external_id="p-2"))
+        for attempt in (
+            lambda: self.create(database, data_set),
+            lambda: self.patch(database, data_set, other.id, {"external_id": "p-1"}),
+        ):
+            with pytest.raises(Problem) as caught:
+                attempt()
+            assert caught.value.slug == "external-id-conflict"
+
+    def test_a_patch_changes_what_it_names(self, database, data_set) -> None:
+        made = self.create(database, data_set)
+        changed = self.patch(
+            database, data_set, made.id, {"tags": ["c"], "sex": None, "external_id": "p-9"}, if_match=1
+        )
+        assert changed == replace(
+            made, tags=("c",), sex=None, external_id="p-9", revision=2, updated_at=changed.updated_at
+        )
+        with database.read() as conn:
+            assert athletes.get(conn, data_set, made.id) == changed
+
+    def test_a_patch_that_changes_nothing_keeps_the_revision(self, database, data_set) -> None:
+        made = self.create(database, data_set)
+        assert self.patch(database, data_set, made.id, {"sport": "hockey"}) == made
+
+    def test_a_patch_of_another_revision_is_refused(self, database, data_set) -> None:
+        made = self.create(database, data_set)
+        with pytest.raises(Problem) as caught:
+            self.patch(database, data_set, made.id, {"sport": "x"}, if_match=3)
+        assert caught.value.slug == "precondition-failed"
+
+    def test_a_patch_of_what_is_no_field_is_a_mistake(self, database, data_set) -> None:
+        made = self.create(database, data_set)
+        with pytest.raises(ValueError, match="revision"):
+            self.patch(database, data_set, made.id, {"revision": 9})
+
+    def test_nobody_can_be_patched_or_erased(self, database, data_set) -> None:
+        for attempt in (
+            lambda: self.patch(database, data_set, ids.new(), {}),
+            lambda: database.write(lambda conn: athletes.erase(conn, data_set, ids.new())),
+        ):
+            with pytest.raises(Problem) as caught:
+                attempt()
+            assert caught.value.slug == "not-found"
+
+    def test_an_erased_athletes_external_id_is_free(self, database, data_set) -> None:
+        made = self.create(database, data_set)
+        database.write(lambda conn: athletes.erase(conn, data_set, made.id, if_match=1))
+        assert self.create(database, data_set).id != made.id
+
+
+class TestDevices:
+    MOUNTING = {"accelerometer": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "offset_mm": [1.5, 0, -70.25]}}
+
+    def put(self, database, data_set, fields, **options):
+        return database.write(lambda conn: devices.put(conn, data_set, "mg-1", fields, **options))
+
+    def test_a_device_is_made_then_replaced_with_a_revision(self, database, data_set) -> None:
+        made, created = self.put(database, data_set, DeviceFields(maker="Acme", mounting=self.MOUNTING))
+        same, created_again = self.put(database, data_set, DeviceFields(maker="Acme", mounting=self.MOUNTING))
+        changed, _ = self.put(database, data_set, DeviceFields(trigger_threshold_g=10.0), if_match=1)
+        assert (created, created_again, same) == (True, False, made)
+        assert (changed.revision, changed.maker, changed.mounting) == (2, None, None)
+        with database.read() as conn:
+            assert devices.get(conn, data_set, "mg-1") == changed
+            assert devices.page(conn, data_set).rows == (changed,)
+            assert devices.page(conn, data_set, serial="mg-2").rows == ()
+            assert devices.page(conn, data_set, updated_since=changed.updated_at).rows == (changed,)
+
+    def test_a_change_to_another_revision_is_refused(self, database, data_set) -> None:
+        with pytest.raises(Problem):
+            self.put(database, data_set, DeviceFields(), if_match=1)
+        self.put(database, data_set, DeviceFields())
+        with pytest.raises(Problem):
+            self.put(database, data_set, DeviceFields(maker="Acme"), if_match=2)
+
+    def test_a_device_made_by_an_impact_can_be_described_later(self, database, data_set, make_impact) -> None:
+        impact = add(database, data_set, make_impact(device_serial="mg-1")).impact
+        described, created = self.put(database, data_set, DeviceFields(mounting=self.MOUNTING))
+        assert (described.id, created, described.mounting) == (impact.device_id, False, self.MOUNTING)
+
+
+def test_the_figures_for_the_planner_lead_to_the_indices(database, data_set) -> None:
+    """Each lookup of the hot path and of an athlete's list is a search, never a walk through a data set."""
+    with database.read() as conn:
+        for query, index in (
+            (impacts._SAME_EVENT, "ix_impacts_data_set_id_input_digest_id"),
+            (impacts._KNOWN._statement, "ix_impacts_data_set_id_updated_at_id"),
+        ):
+            compiled = query.compile(dialect=conn.dialect)
+            empty = tuple(compiled.params.get(name) for name in compiled.positiontup)
+            plan = conn.exec_driver_sql(f"EXPLAIN QUERY PLAN {compiled}", empty).all()
+            assert any(index in step[-1] for step in plan)
+            assert not any(step[-1].startswith("SCAN impacts") for step in plan)
+
+
+def test_every_criterion_of_the_science_has_its_columns() -> None:
+    from headimpact.criteria import CRITERIA
+    from headimpact_service.store.tables import CRITERION_COMPONENTS
+
+    registry = CRITERIA.values() if isinstance(CRITERIA, dict) else CRITERIA
+    assert [(each.key, each.components) for each in registry] == list(CRITERION_COMPONENTS.items())

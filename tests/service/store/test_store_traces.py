@@ -1,0 +1,76 @@
+"""The trace codec gives back every bit."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from headimpact_service.store import traces
+from headimpact_service.store.traces import TraceCodecError
+
+any_bits = arrays(np.uint64, array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=40)).map(
+    lambda bits: bits.view(np.float64)
+)
+single = arrays(np.float32, array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=40)).map(
+    lambda values: values.astype(np.float64)
+)
+WAVE = np.sin(np.linspace(0, 6, 300)).reshape(100, 3)
+
+
+@given(st.dictionaries(st.text(max_size=20), any_bits | single, max_size=5))
+def test_every_bit_of_every_array_comes_back(signals: dict[str, np.ndarray]) -> None:
+    decoded = traces.decode(traces.encode(signals))
+    assert list(decoded) == list(signals)
+    for name, values in signals.items():
+        assert decoded[name].dtype == np.float64
+        assert decoded[name].shape == values.shape
+        assert decoded[name].tobytes() == np.ascontiguousarray(values).tobytes()
+
+
+def test_a_strided_view_is_stored_as_its_values() -> None:
+    assert np.array_equal(traces.decode(traces.encode({"a": WAVE[::2, ::-1]}))["a"], WAVE[::2, ::-1])
+
+
+def test_samples_of_single_precision_take_less_than_half_the_bytes() -> None:
+    narrow = WAVE.astype(np.float32).astype(np.float64)
+    assert len(traces.encode({"a": narrow})) < 0.55 * len(traces.encode({"a": WAVE}))
+
+
+def test_what_was_written_today_is_read_for_ever() -> None:
+    fixed = bytes([1, 1]) + bytes.fromhex("01 04 01 03000000 01000000") + b"a"
+    fixed += zlib.compress(np.array([1.0, -0.0, 2.5], dtype="<f4").view(np.uint8).reshape(3, 4).T.tobytes())
+    assert traces.decode(fixed)["a"].tobytes() == np.array([1.0, -0.0, 2.5]).tobytes()
+
+
+def test_a_signal_of_three_dimensions_is_refused() -> None:
+    with pytest.raises(TraceCodecError, match="dimensions"):
+        traces.encode({"a": np.zeros((2, 2, 2))})
+
+
+def test_a_name_of_more_than_255_bytes_is_refused() -> None:
+    with pytest.raises(TraceCodecError, match="255"):
+        traces.encode({"a" * 256: WAVE})
+
+
+def test_an_unknown_codec_is_refused() -> None:
+    with pytest.raises(TraceCodecError, match="codec"):
+        traces.decode(b"\x09" + traces.encode({"a": WAVE})[1:])
+
+
+@pytest.mark.parametrize("damage", [slice(0, 0), slice(0, 1), slice(0, 9), slice(0, 40), slice(0, -5)])
+def test_a_truncated_trace_is_refused(damage: slice) -> None:
+    with pytest.raises(TraceCodecError, match="damaged"):
+        traces.decode(traces.encode({"a": WAVE})[damage])
+
+
+@pytest.mark.parametrize(("at", "value"), [(3, 5), (4, 3), (5, 101), (5, 99)])
+def test_a_table_that_does_not_fit_its_samples_is_refused(at: int, value: int) -> None:
+    damaged = bytearray(traces.encode({"a": WAVE}))
+    damaged[at] = value
+    with pytest.raises(TraceCodecError, match="damaged"):
+        traces.decode(bytes(damaged))
