@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import ceil, floor, radians
+from math import ceil, floor, inf, radians
 
 import numpy as np
 
@@ -25,11 +25,12 @@ from headimpact.kinematics import (
 from headimpact.published import FILTERS, QUALITY_LIMITS
 from headimpact.quality import (
     AXES,
+    Channel,
     QualityNote,
     check_angular_acceleration,
+    check_channels,
     check_identical,
     check_rate,
-    check_signal,
     words,
 )
 from headimpact.recording import Recording, Signal, SignalName
@@ -236,18 +237,26 @@ def _require_bounds(aligned: dict[str, FloatArray]) -> None:
 
 
 def _notes_as_sent(recording: Recording, sent: dict[SignalName, _Uniform]) -> Iterator[QualityNote]:
+    """Notes on every channel; those of equal length are checked together."""
+    by_length: dict[int, list[tuple[SignalName, Signal]]] = {}
     for name, signal in recording.signals():
-        values = sent[name].values
-        full_scale = signal.declared_range
-        if full_scale is not None:
-            full_scale *= TO_CRITERIA_UNIT[signal.unit]
-        yield from check_signal(name, values, full_scale, recording.constrained_plane is not None)
+        by_length.setdefault(signal.values.shape[0], []).append((name, signal))
+    for signals in by_length.values():
+        channels = [Channel(name, axis, _full_scale(signal)) for name, signal in signals for axis in AXES]
+        # transposed and back: stacked by component
+        samples = np.concatenate([sent[name].values.T for name, _ in signals]).T
+        yield from check_channels(channels, samples, recording.constrained_plane is not None)
     if "linear_acceleration" in sent:
         for rotation in ("angular_velocity", "angular_acceleration"):
             if rotation in sent:
                 yield from check_identical(
                     ("linear_acceleration", sent["linear_acceleration"].values), (rotation, sent[rotation].values)
                 )
+
+
+def _full_scale(signal: Signal) -> float:
+    """The declared range in the criteria's unit; infinite where none is declared."""
+    return inf if signal.declared_range is None else signal.declared_range * TO_CRITERIA_UNIT[signal.unit]
 
 
 def _filtered(

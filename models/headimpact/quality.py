@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from headimpact.kinematics import HeadKinematics
+from headimpact.kinematics import HeadKinematics, largest
 from headimpact.published import QUALITY_LIMITS
 
 FloatArray = NDArray[np.float64]
@@ -37,90 +37,104 @@ def words(signal: str) -> str:
     return signal.replace("_", " ")
 
 
-def check_signal(signal: str, samples: FloatArray, declared_range: float | None, planar: bool) -> Iterator[QualityNote]:
-    """Notes on one signal as sent, n x 3, in the criteria's unit."""
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One component of one signal; `declared_range` is its sensor's full scale, infinite where none is declared."""
+
+    signal: str
+    axis: str
+    declared_range: float
+
+
+def check_channels(channels: Sequence[Channel], samples: FloatArray, planar: bool) -> Iterator[QualityNote]:
+    """Notes on single channels as sent.
+
+    Parameters
+    ----------
+    channels
+        What each column is.
+    samples
+        n x channels, in the criteria's units.
+    planar
+        Whether the motion was constrained to a plane: channels that stay zero are then no finding.
+    """
     magnitude = np.abs(samples)
-    peaks = magnitude.max(axis=0)
-    yield from _extreme_values(signal, peaks)
+    peaks = largest(magnitude)
+    yield from _extreme_values(channels, peaks)
     if not planar:
-        yield from _constant_channels(signal, samples)
-    yield from _saturated(signal, magnitude, peaks, declared_range)
-    yield from _edge_glitches(signal, samples, peaks)
+        yield from _constant_channels(channels, samples)
+    yield from _saturated(channels, magnitude, peaks)
+    yield from _edge_glitches(channels, samples, peaks)
 
 
-def _extreme_values(signal: str, peaks: FloatArray) -> Iterator[QualityNote]:
-    bound = QUALITY_LIMITS[signal]["extreme"]
-    for axis, peak in zip(AXES, peaks.tolist(), strict=True):
+def _extreme_values(channels: Sequence[Channel], peaks: FloatArray) -> Iterator[QualityNote]:
+    for channel, peak in zip(channels, peaks.tolist(), strict=True):
+        bound = QUALITY_LIMITS[channel.signal]["extreme"]
         if peak > bound:
-            yield QualityNote(
+            yield _warning(
                 "extreme_value",
-                "warning",
-                f"The {words(signal)} reaches {peak:.4g} on {axis}; beyond {bound:g} it is rarely a head.",
-                signal,
-                axis,
+                channel,
+                f"The {words(channel.signal)} reaches {peak:.4g} on {channel.axis}; few heads go beyond {bound:g}.",
             )
 
 
-def _constant_channels(signal: str, samples: FloatArray) -> Iterator[QualityNote]:
+def _constant_channels(channels: Sequence[Channel], samples: FloatArray) -> Iterator[QualityNote]:
     constant = (samples == samples[0]).all(axis=0)
-    if constant.any():
-        for axis in np.flatnonzero(constant):
-            level = "zero" if samples[0, axis] == 0 else "one value"
-            yield QualityNote(
-                "constant_channel",
-                "warning",
-                f"The {words(signal)} is {level} on {AXES[axis]} for the whole record.",
-                signal,
-                AXES[axis],
-            )
+    if not constant.any():
+        return
+    for column in np.flatnonzero(constant).tolist():
+        channel = channels[column]
+        level = "zero" if samples[0, column] == 0 else "one value"
+        yield _warning(
+            "constant_channel",
+            channel,
+            f"The {words(channel.signal)} is {level} on {channel.axis} for the whole record.",
+        )
 
 
-def _saturated(
-    signal: str, magnitude: FloatArray, peaks: FloatArray, declared_range: float | None
-) -> Iterator[QualityNote]:
+def _saturated(channels: Sequence[Channel], magnitude: FloatArray, peaks: FloatArray) -> Iterator[QualityNote]:
     """Runs of equal samples at the largest value or within 5 % of the declared range."""
     limits = QUALITY_LIMITS["saturation"]
-    level = peaks
-    if declared_range is not None:
-        level = np.minimum(peaks, limits["range_fraction"] * declared_range)
+    ranges = np.array([channel.declared_range for channel in channels])
+    level = np.minimum(peaks, limits["range_fraction"] * ranges)
     repeated = (magnitude[1:] == magnitude[:-1]) & (magnitude[1:] >= level)
     # a run of three equal samples is two equal pairs in a row
     runs = repeated[1:] & repeated[:-1]
     if not runs.any():
         return
-    for axis in np.flatnonzero(runs.any(axis=0) & (peaks > 0)):
-        if (magnitude[:, axis] == peaks[axis]).all():
-            continue
-        count = int(runs[:, axis].sum()) + limits["run"] - 1
-        yield QualityNote(
+    moving = ~(magnitude == peaks).all(axis=0)
+    for column in np.flatnonzero(runs.any(axis=0) & moving).tolist():
+        channel = channels[column]
+        count = int(runs[:, column].sum()) + limits["run"] - 1
+        yield _warning(
             "saturated",
-            "warning",
-            f"The {words(signal)} stays at one value for {count} samples at its maximum on {AXES[axis]}.",
-            signal,
-            AXES[axis],
+            channel,
+            f"The {words(channel.signal)} stays at one value for {count} samples at its maximum on {channel.axis}.",
         )
 
 
-def _edge_glitches(signal: str, samples: FloatArray, peaks: FloatArray) -> Iterator[QualityNote]:
+def _edge_glitches(channels: Sequence[Channel], samples: FloatArray, peaks: FloatArray) -> Iterator[QualityNote]:
     limits = QUALITY_LIMITS["edge"]
     near = limits["steps"] + 1
     if samples.shape[0] < 2 * near:
         return
-    ends = np.stack((samples[: near + 1], samples[: -near - 2 : -1]))
-    steps = np.abs(ends[:, 1:] - ends[:, :-1])
-    far = (steps[:, 0] > limits["ratio"] * steps[:, 1:].max(axis=1)) & (steps[:, 0] > limits["share_of_peak"] * peaks)
-    if not far.any():
-        return
-    for end, axis in zip(*np.nonzero(far), strict=True):
-        which = ("first", "last")[end]
-        yield QualityNote(
-            "edge_glitch",
-            "warning",
-            f"The {which} sample of the {words(signal)} is far off its neighbours on {AXES[axis]}: a step of "
-            f"{steps[end, 0, axis]:.4g}, {limits['ratio']:g} times larger than those beside it.",
-            signal,
-            AXES[axis],
-        )
+    for which, end in (("first", samples[: near + 1]), ("last", samples[: -near - 2 : -1])):
+        steps = np.abs(end[1:] - end[:-1])
+        bound = np.maximum(limits["ratio"] * largest(steps[1:]), limits["share_of_peak"] * peaks)
+        far = steps[0] > bound
+        if far.any():
+            for column in np.flatnonzero(far).tolist():
+                channel = channels[column]
+                yield _warning(
+                    "edge_glitch",
+                    channel,
+                    f"The {which} sample of the {words(channel.signal)} is far off its neighbours on {channel.axis}: a "
+                    f"step of {steps[0, column]:.4g}, over {limits['ratio']:g} times those beside it.",
+                )
+
+
+def _warning(code: str, channel: Channel, detail: str) -> QualityNote:
+    return QualityNote(code, "warning", detail, channel.signal, channel.axis)
 
 
 def check_identical(first: tuple[str, FloatArray], second: tuple[str, FloatArray]) -> Iterator[QualityNote]:
