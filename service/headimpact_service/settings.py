@@ -15,13 +15,15 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="HEADIMPACT_", frozen=True, extra="ignore")
 
-    database_url: str = Field("sqlite:///headimpact.db", description="SQLAlchemy URL of the database.")
-    host: str = Field("127.0.0.1", description="Address to listen on.")
-    port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
-    max_body: int = Field(8 * MEBIBYTE, ge=1, description="Largest JSON body, as sent and inflated [bytes].")
-    max_upload: int = Field(512 * MEBIBYTE, ge=1, description="Largest upload, as sent and inflated [bytes].")
-    head_timeout_s: float = Field(20.0, gt=0, description="A request's head must arrive within this time [s].")
-    body_timeout_s: float = Field(30.0, gt=0, description="Longest pause between two parts of a body [s].")
-    rate_limit: int | None = Field(None, ge=1, description="Requests a minute and key; none unless set.")
-    log_level: Literal["debug", "info", "warning", "error"] = Field("info", description="Least severe line logged.")
+    database_url: str = Field(default="sqlite:///headimpact.db", description="SQLAlchemy URL of the database.")
+    host: str = Field(default="127.0.0.1", description="Address to listen on.")
+    port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
+    max_body: int = Field(default=8 * MEBIBYTE, ge=1, description="Largest JSON body, as sent and inflated [bytes].")
+    max_upload: int = Field(default=512 * MEBIBYTE, ge=1, description="Largest upload, as sent and inflated [bytes].")
+    head_timeout_s: float = Field(default=20.0, gt=0, description="A request's head must arrive within this time [s].")
+    body_timeout_s: float = Field(default=30.0, gt=0, description="Longest pause between two parts of a body [s].")
+    rate_limit: int | None = Field(default=None, ge=1, description="Requests a minute and key; none unless set.")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        default="info", description="Least severe line logged."
+    )
     access_log: bool = Field(default=False, description="One structured line for each request.")

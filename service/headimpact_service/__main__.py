@@ -1,0 +1,147 @@
+"""`headimpact`: serve, migrate, make keys, score a file, write the API's description."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+USAGE = 2
+"""Exit code for input that cannot be used."""
+FAILED = 1
+
+app = typer.Typer(
+    name="headimpact",
+    help="Head-impact traces in; brain angles, injury criteria and concussion probabilities out. Research use only.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+keys_app = typer.Typer(help="Make, list and revoke API keys.", no_args_is_help=True)
+app.add_typer(keys_app, name="keys")
+
+DatabaseUrl = Annotated[
+    str | None, typer.Option(help="SQLAlchemy URL; HEADIMPACT_DATABASE_URL or sqlite:///headimpact.db unless given.")
+]
+Organisation = Annotated[str, typer.Option(help="Name of the organisation.")]
+
+
+class Mode(StrEnum):
+    """Which data set a key sees."""
+
+    LIVE = "live"
+    TEST = "test"
+
+
+@app.command()
+def serve(
+    host: Annotated[str | None, typer.Option(help="Address to listen on.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one.")] = None,
+    database_url: DatabaseUrl = None,
+) -> None:
+    """Migrate the database and serve the API; on an empty database make and print a first key."""
+    from headimpact_service.cli import serve as command
+
+    command.run(host=host, port=port, database_url=database_url)
+
+
+@app.command()
+def migrate(database_url: DatabaseUrl = None) -> None:
+    """Bring the database to this version's schema."""
+    from headimpact_service.cli import database as command
+
+    command.migrate(database_url)
+
+
+@keys_app.command("create")
+def create_key(
+    organisation: Organisation,
+    scope: Annotated[list[str], typer.Option(help="May be repeated; `all` is every scope.")],
+    mode: Annotated[Mode, typer.Option(help="A test key sees a separate sandbox data set.")] = Mode.LIVE,
+    name: Annotated[str, typer.Option(help="What the key is for.")] = "key",
+    database_url: DatabaseUrl = None,
+) -> None:
+    """Make a key; the organisation is made or reused by its name. The last line printed is the key."""
+    from headimpact_service.cli import keys as command
+
+    command.create(organisation, scope, mode=mode.value, name=name, database_url=database_url)
+
+
+@keys_app.command("list")
+def list_keys(organisation: Organisation = "default", database_url: DatabaseUrl = None) -> None:
+    """List an organisation's keys, revoked ones too."""
+    from headimpact_service.cli import keys as command
+
+    command.show(organisation, database_url=database_url)
+
+
+@keys_app.command("revoke")
+def revoke_key(key_id: str, organisation: Organisation = "default", database_url: DatabaseUrl = None) -> None:
+    """Make a key invalid."""
+    from headimpact_service.cli import keys as command
+
+    command.revoke(organisation, key_id, database_url=database_url)
+
+
+@app.command()
+def score(
+    file: Annotated[Path, typer.Argument(help="CSV, JSON, NDJSON or NHTSA zip; - for standard input.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the JSON of POST /v1/score.")] = False,
+    preset: Annotated[str | None, typer.Option(help="A device's layout, as GET /v1/presets lists them.")] = None,
+    mapping: Annotated[str | None, typer.Option(help="JSON, or @ and a file of it: which column is what.")] = None,
+    sample_rate_hz: Annotated[str | None, typer.Option(help="Samples per second.")] = None,
+    axes: Annotated[str | None, typer.Option(help="anatomical or sae_j211.")] = None,
+    low_pass: Annotated[str | None, typer.Option("--filter", help="paper, none, or JSON.")] = None,
+    occurred_at: Annotated[str | None, typer.Option(help="RFC 3339, or a local time with --time-zone.")] = None,
+    time_zone: Annotated[str | None, typer.Option(help="IANA zone of local times.")] = None,
+) -> None:
+    """Score the impacts of a file; nothing is stored and no service is needed."""
+    from headimpact_service.cli import score as command
+
+    fields = {
+        "preset": preset,
+        "mapping": mapping,
+        "sample_rate_hz": sample_rate_hz,
+        "axes": axes,
+        "filter": low_pass,
+        "occurred_at": occurred_at,
+        "time_zone": time_zone,
+    }
+    given = {name: value for name, value in fields.items() if value is not None}
+    raise typer.Exit(command.run(file, given, as_json=as_json))
+
+
+@app.command()
+def openapi(
+    output: Annotated[Path, typer.Option(help="Where the OpenAPI document goes.")] = Path("openapi/openapi.json"),
+    problems: Annotated[Path, typer.Option(help="Where the list of problems goes.")] = Path("docs/problems.md"),
+) -> None:
+    """Write the API's description and the list of problems, both made from the code."""
+    from headimpact_service.cli import openapi as command
+
+    command.write(output, problems)
+
+
+def main() -> None:
+    """Run a command; whatever goes wrong is one line, with exit code 2 where the input is to blame."""
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except Exception as error:
+        sys.exit(_report(error))
+
+
+def _report(error: Exception) -> int:
+    from headimpact_service.cli.faults import explain
+
+    text, code = explain(error)
+    print(f"headimpact: {text}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    main()
