@@ -15,6 +15,7 @@ from headimpact_service import deps, openapi
 from headimpact_service.answers import problem_answer
 from headimpact_service.errors import PROBLEMS, Problem
 from headimpact_service.middleware import Edge
+from headimpact_service.operation import Operation, resources
 from headimpact_service.pages import docs, problems
 from headimpact_service.routes import (
     athletes,
@@ -29,7 +30,6 @@ from headimpact_service.routes import (
     settings,
 )
 from headimpact_service.routes.facts import Facts
-from headimpact_service.routes.operation import Operation, resources
 from headimpact_service.settings import Settings
 from headimpact_service.store.database import Database
 

@@ -13,8 +13,8 @@ from pydantic.json_schema import JsonSchemaMode, models_json_schema
 from headimpact_service import __version__
 from headimpact_service.answers import JSON, PROBLEM_JSON
 from headimpact_service.errors import PROBLEMS
+from headimpact_service.operation import ANY_KEY, PUBLIC, Answer, BodyForm, Operation
 from headimpact_service.problem_shapes import ProblemDocument
-from headimpact_service.routes.operation import ANY_KEY, PUBLIC, Answer, BodyForm, Operation
 
 _REF = "#/components/schemas/{model}"
 _NAME_IN_PATH = re.compile(r"{(\w+)(?::path)?}")

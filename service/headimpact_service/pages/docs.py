@@ -10,8 +10,8 @@ from starlette.responses import RedirectResponse, Response
 
 from headimpact_service.answers import JSON
 from headimpact_service.errors import not_found
+from headimpact_service.operation import PUBLIC, Answer, Call, Routes
 from headimpact_service.pages.html import page
-from headimpact_service.routes.operation import PUBLIC, Answer, Call, Routes
 
 HTML = "text/html"
 # Only these names are served: nothing of a request ever becomes a path.

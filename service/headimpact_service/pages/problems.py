@@ -9,8 +9,8 @@ from starlette.responses import Response
 
 from headimpact_service.answers import JSON, answer
 from headimpact_service.errors import PROBLEMS, ProblemType, not_found
+from headimpact_service.operation import PUBLIC, Answer, Call, Routes
 from headimpact_service.pages.html import page
-from headimpact_service.routes.operation import PUBLIC, Answer, Call, Routes
 
 HTML = "text/html"
 

@@ -14,9 +14,9 @@ from headimpact_service.answers import answer
 from headimpact_service.errors import invalid_parameter, not_found
 from headimpact_service.ingest.impact_json import MountingBody, Name, Strict, Text, Word
 from headimpact_service.ingest.impact_reading import mounting
+from headimpact_service.operation import Answer, Call, Routes
+from headimpact_service.parameters import SyncQuery
 from headimpact_service.routes.lists import MEDIA_TYPES, Cell, Listing, answer_list
-from headimpact_service.routes.operation import Answer, Call, Routes
-from headimpact_service.routes.parameters import SyncQuery
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
 from headimpact_service.store import devices, ids
 from headimpact_service.store.devices import Device, DeviceFields

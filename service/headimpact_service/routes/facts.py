@@ -14,7 +14,7 @@ from headimpact_service.ingest.impact_json import MountingBody
 from headimpact_service.ingest.impact_reading import mounting
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.scoring import UNKNOWN_DEVICE, DeviceFacts
-from headimpact_service.routes.operation import Call
+from headimpact_service.operation import Call
 from headimpact_service.store import athletes, devices, ids
 from headimpact_service.store.athletes import Athlete
 

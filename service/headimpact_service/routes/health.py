@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from starlette.responses import Response
 
 from headimpact_service.answers import answer
-from headimpact_service.routes.operation import PUBLIC, Answer, Call, Routes
+from headimpact_service.operation import PUBLIC, Answer, Call, Routes
 from headimpact_service.store.database import Database
 
 routes = Routes("health")

@@ -21,10 +21,10 @@ from headimpact_service.ingest.impact_json import MAX_OPERATING_POINTS, Operatin
 from headimpact_service.intake.records import raw_traces, rebuild_record
 from headimpact_service.intake.rendering import brain_trace, head_traces, new_score, score_document
 from headimpact_service.intake.scoring import Terms, score_record
+from headimpact_service.operation import Answer, Call, Routes
+from headimpact_service.parameters import Query
 from headimpact_service.routes.impacts import identifier, present
 from headimpact_service.routes.operating_points import requests_of
-from headimpact_service.routes.operation import Answer, Call, Routes
-from headimpact_service.routes.parameters import Query
 from headimpact_service.routes.score_shapes import ScoreView, Shape, TraceView
 from headimpact_service.store import impacts, scores, traces
 from headimpact_service.store.impact_rows import Impact

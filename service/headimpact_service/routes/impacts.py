@@ -17,10 +17,10 @@ from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.rendering import scored_traces
 from headimpact_service.intake.scoring import Scored, digest_bytes
 from headimpact_service.intake.storing import new_impact
+from headimpact_service.operation import Answer, Call, Routes
+from headimpact_service.parameters import Fraction, Instant, SyncQuery
 from headimpact_service.routes.impact_shapes import COLUMNS, ImpactList, ImpactView, impact_cells, impact_document
 from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
-from headimpact_service.routes.operation import Answer, Call, Routes
-from headimpact_service.routes.parameters import Fraction, Instant, SyncQuery
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
 from headimpact_service.routes.scoring import RECORD_PROBLEMS, score
 from headimpact_service.store import impacts

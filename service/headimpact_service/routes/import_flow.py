@@ -17,8 +17,8 @@ from headimpact_service.intake.records import describe, kinematics_document
 from headimpact_service.intake.rendering import new_score, score_document
 from headimpact_service.intake.scoring import DeviceFacts, Scored, digest_bytes, score_records
 from headimpact_service.intake.storing import new_impact
+from headimpact_service.operation import Call
 from headimpact_service.routes.facts import facts_in
-from headimpact_service.routes.operation import Call
 from headimpact_service.store import ids, impacts
 from headimpact_service.store.impacts import NewImpact
 

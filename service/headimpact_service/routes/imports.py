@@ -16,11 +16,11 @@ from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import list_presets
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.upload import read_upload
+from headimpact_service.operation import ANY_KEY, Answer, BodyForm, Call, Routes
+from headimpact_service.parameters import Flag, Query, validate_parameters
 from headimpact_service.problem_shapes import ProblemDocument
 from headimpact_service.routes.impact_shapes import KinematicsView
 from headimpact_service.routes.import_flow import preview_row, score_all, store_all
-from headimpact_service.routes.operation import ANY_KEY, Answer, BodyForm, Call, Routes
-from headimpact_service.routes.parameters import Flag, Query, validate_parameters
 from headimpact_service.routes.score_shapes import PeaksView, QualityView
 from headimpact_service.routes.uploads import MULTIPART, RAW, Upload, read_file
 

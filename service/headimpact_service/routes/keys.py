@@ -11,7 +11,7 @@ from starlette.responses import Response
 from headimpact_service import deps
 from headimpact_service.answers import answer, no_content
 from headimpact_service.ingest.impact_json import Name, Strict
-from headimpact_service.routes.operation import ANY_KEY, Answer, Call, Routes
+from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
 from headimpact_service.store import ids, keys
 
 routes = Routes("keys")

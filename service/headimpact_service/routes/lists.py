@@ -13,8 +13,8 @@ from starlette.responses import Response, StreamingResponse
 
 from headimpact_service import deps
 from headimpact_service.answers import CSV, JSON, NDJSON, answer, json_bytes
-from headimpact_service.routes.operation import Call
-from headimpact_service.routes.parameters import ListQuery
+from headimpact_service.operation import Call
+from headimpact_service.parameters import ListQuery
 from headimpact_service.store.paging import Page, Position, Positioned, decode_cursor, encode_cursor
 
 Row = TypeVar("Row", bound=Positioned)

@@ -12,7 +12,7 @@ from headimpact.errors import UnknownModel
 from headimpact.risk import PUBLISHED_MODELS, PublishedPoint, RiskModel, critical_values, load_model, probability_of
 from headimpact_service.answers import answer
 from headimpact_service.errors import not_found
-from headimpact_service.routes.operation import Answer, Call, Routes
+from headimpact_service.operation import Answer, Call, Routes
 
 routes = Routes("models")
 

@@ -13,7 +13,7 @@ from headimpact_service.ingest.impact_reading import to_record
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.rendering import new_score, score_document, scored_traces
 from headimpact_service.intake.scoring import UNKNOWN_DEVICE, DeviceFacts, Scored, Terms, score_record
-from headimpact_service.routes.operation import Answer, Call, Routes
+from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.routes.score_shapes import ScoreView
 
 routes = Routes("scores")

@@ -12,8 +12,8 @@ from headimpact_service import deps
 from headimpact_service.answers import answer
 from headimpact_service.ingest.impact_json import MAX_OPERATING_POINTS, Fraction, OperatingPointBody, Strict
 from headimpact_service.intake.scoring import Terms, operating_points
+from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
 from headimpact_service.routes.operating_points import requests_of
-from headimpact_service.routes.operation import ANY_KEY, Answer, Call, Routes
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
 from headimpact_service.store import organisation_settings
 from headimpact_service.store.organisation_settings import OrganisationSettings

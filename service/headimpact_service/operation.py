@@ -24,7 +24,7 @@ from headimpact_service.bodies import read_json
 from headimpact_service.deps import Caller
 from headimpact_service.errors import Problem
 from headimpact_service.intake.scoring import Terms
-from headimpact_service.routes.parameters import NoQuery, Query, parse_query
+from headimpact_service.parameters import NoQuery, Query, parse_query
 from headimpact_service.store.keys import KeyRow
 
 PUBLIC = ""
