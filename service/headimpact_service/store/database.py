@@ -12,11 +12,10 @@ from typing import Any, TypeVar
 from pydantic_core import from_json, to_json
 from sqlalchemy import Connection, Engine, NullPool, create_engine, event
 from sqlalchemy.engine import URL, make_url
-from sqlalchemy.exc import ArgumentError, OperationalError
-from sqlalchemy.exc import TimeoutError as PoolTimeout
+from sqlalchemy.exc import ArgumentError, DatabaseError, OperationalError, SQLAlchemyError
 
 from headimpact_service.store import migrate
-from headimpact_service.store.unavailable import unavailable
+from headimpact_service.store.unavailable import is_out_of_reach, unavailable
 from headimpact_service.store.writer import Writer
 
 T = TypeVar("T")
@@ -53,7 +52,9 @@ class Database:
         try:
             with self._reading.connect() as conn:
                 yield conn
-        except (OperationalError, PoolTimeout) as error:
+        except SQLAlchemyError as error:
+            if not is_out_of_reach(error):
+                raise
             raise unavailable("The database cannot be read now.") from error
 
     def write(self, run: Callable[[Connection], T]) -> T:
@@ -73,7 +74,9 @@ class Database:
         engine = self._engine("BEGIN IMMEDIATE", query_only=False, foreign_keys=False, poolclass=NullPool)
         try:
             migrate.upgrade(engine, revision)
-        except OperationalError as error:
+        except DatabaseError as error:
+            if not is_out_of_reach(error):
+                raise
             raise unavailable("The database cannot be opened for migration now.") from error
         finally:
             engine.dispose()

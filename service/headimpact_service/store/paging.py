@@ -11,10 +11,10 @@ from datetime import datetime, timedelta
 from hashlib import blake2b
 from typing import Any, Generic, Protocol, TypeVar
 
-from sqlalchemy import Select, Table, tuple_
+from sqlalchemy import Select, Table, literal, tuple_
 
 from headimpact_service.errors import Problem
-from headimpact_service.store.columns import EPOCH, MICROSECOND
+from headimpact_service.store.columns import EPOCH, MICROSECOND, Identifier, Instant
 from headimpact_service.store.ids import LENGTH
 
 
@@ -102,11 +102,12 @@ def _by_change(
     query: Select[Columns], table: Table, updated_since: datetime, after: Position | None
 ) -> Select[Columns]:
     """In the order of change, from an instant on or behind a position."""
-    change = tuple_(table.c.updated_at, table.c.id)
     if after is None:
         query = query.where(table.c.updated_at >= updated_since)
     else:
-        query = query.where(change > tuple_(after.updated_at, after.id))
+        # Typed, or the driver would send the instant in a form of its own.
+        position = tuple_(literal(after.updated_at, Instant()), literal(after.id, Identifier))
+        query = query.where(tuple_(table.c.updated_at, table.c.id) > position)
     return query.order_by(table.c.updated_at, table.c.id)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from sqlalchemy.exc import DatabaseError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
+
 from headimpact_service.errors import Problem
 
 RETRY_AFTER_S = 2
@@ -10,3 +13,11 @@ RETRY_AFTER_S = 2
 def unavailable(detail: str) -> Problem:
     """A 503 that says when to come back."""
     return Problem("unavailable", detail, headers={"Retry-After": str(RETRY_AFTER_S)})
+
+
+def is_out_of_reach(error: BaseException) -> bool:
+    """Whether an error is the database's own: locked, full, unreadable, damaged; not a mistake in what it was asked.
+
+    The driver names a damaged file by the class that all of its errors have in common.
+    """
+    return isinstance(error, OperationalError | PoolTimeout) or type(error) is DatabaseError

@@ -16,10 +16,9 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from sqlalchemy import Connection, Engine
-from sqlalchemy.exc import OperationalError
 
 from headimpact_service.errors import Problem
-from headimpact_service.store.unavailable import unavailable
+from headimpact_service.store.unavailable import is_out_of_reach, unavailable
 
 T = TypeVar("T")
 
@@ -186,7 +185,7 @@ def _blame(group: list[_Write], error: BaseException) -> bool:
     if len(group) > 1 and not _began_or_ended_badly(error):
         return False
     answer = error
-    if isinstance(error, OperationalError):
+    if is_out_of_reach(error):
         answer = unavailable("The database cannot take this write now.")
         answer.__cause__ = error
     for write in group:
@@ -199,7 +198,7 @@ def _began_or_ended_badly(error: BaseException) -> bool:
 
     Trying its writes one by one would only wait as often. SQLAlchemy names no statement for opening and committing.
     """
-    return isinstance(error, OperationalError) and (error.statement or "BEGIN").startswith("BEGIN")
+    return is_out_of_reach(error) and (getattr(error, "statement", None) or "BEGIN").startswith("BEGIN")
 
 
 def _answer(group: list[_Write]) -> None:

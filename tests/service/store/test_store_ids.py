@@ -29,8 +29,19 @@ def test_later_identifiers_are_greater() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "imp", "imp_", "ath_" + "0" * 26, "imp_" + "0" * 25, "imp_" + "0" * 27, "imp_8" + "0" * 25, "imp_" + "u" * 26]
-    + ["imp_" + "0" * 25 + "O", "imp_" + "0" * 26 + "\n", "imp_" + "\u0660" * 26],
+    [
+        "",
+        "imp",
+        "imp_",
+        "ath_" + "0" * 26,
+        "imp_" + "0" * 25,
+        "imp_" + "0" * 27,
+        "imp_8" + "0" * 25,
+        "imp_" + "u" * 26,
+        "imp_" + "0" * 25 + "O",
+        "imp_" + "0" * 26 + "\n",
+        "imp_" + "\u0660" * 26,
+    ],
 )
 def test_what_is_none_of_ours_is_none(text: str) -> None:
     assert ids.decode("imp", text) is None

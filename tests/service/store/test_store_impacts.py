@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from typing import ClassVar
 
 import pytest
 from sqlalchemy import func, select
@@ -47,10 +48,8 @@ class TestAdd:
         assert (kept.content_digest, kept.key_id, kept.document) == (new.content_digest, key.id, new.document)
 
     def test_an_impact_that_says_nothing_of_itself_is_stored(self, database, data_set, make_impact, make_score) -> None:
-        nothing = dict.fromkeys(
-            ("external_id", "athlete_external_id", "device_serial", "occurred_at", "session_id", "activity")
-            + ("sport", "position", "context")
-        )
+        names = "external_id athlete_external_id device_serial occurred_at session_id activity sport position context"
+        nothing = dict.fromkeys(names.split())
         unscorable = make_score(state="unscorable", values={}, probabilities={}, quality_codes=())
         new = make_impact(**nothing, score=unscorable)
         first, second = add(database, data_set, new).impact, add(database, data_set, new).impact
@@ -480,7 +479,9 @@ class TestAthletes:
 
 
 class TestDevices:
-    MOUNTING = {"accelerometer": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "offset_mm": [1.5, 0, -70.25]}}
+    MOUNTING: ClassVar = {
+        "accelerometer": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "offset_mm": [1.5, 0, -70.25]}
+    }
 
     def put(self, database, data_set, fields, **options):
         return database.write(lambda conn: devices.put(conn, data_set, "mg-1", fields, **options))

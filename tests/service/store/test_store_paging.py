@@ -15,7 +15,7 @@ POSITION = Position(datetime(2026, 11, 20, 19, 4, 5, 123456, tzinfo=UTC), bytes(
 
 
 @given(
-    st.datetimes(min_value=datetime(1970, 1, 1), timezones=st.just(UTC)),
+    st.datetimes(min_value=datetime(1970, 1, 1), timezones=st.just(UTC)),  # noqa: DTZ001 - hypothesis adds the zone
     st.binary(min_size=16, max_size=16),
     st.text(st.characters()),
 )
