@@ -152,10 +152,10 @@ def test_resampling_by_linear_interpolation_changes_nothing_at_the_old_samples(s
 @pytest.mark.parametrize(("rate_hz", "samples"), [(1000.0, 100), (500.0, 5000), (3200.0, 4000)])
 def test_a_block_of_impacts_equals_each_of_them_bit_for_bit(rate_hz, samples):
     # the longer ones cross the segments that the solution works in
-    block = np.random.default_rng(2).normal(0, 2000, (samples, 20, 3))
+    block = np.random.default_rng(2).normal(0, 2000, (samples, 3, 20))
     together = brain_angle_history(block, rate_hz)
-    for i in range(block.shape[1]):
-        np.testing.assert_array_equal(together[:, i], brain_angle_history(block[:, i], rate_hz))
+    for i in range(block.shape[2]):
+        np.testing.assert_array_equal(together[..., i], brain_angle_history(block[..., i], rate_hz))
 
 
 @pytest.mark.campaign

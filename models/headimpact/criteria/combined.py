@@ -51,5 +51,7 @@ def vtcp(kinematics: HeadKinematics) -> FloatArray:
         + VTCP["angular_acceleration_per_rad_s2"] * alpha
         + VTCP["product"] * a * alpha
     )
-    probability: FloatArray = 1.0 / (1.0 + np.exp(-linear_predictor))
+    # the product term can carry the exponent past floating point's range, where the probability is 0
+    with np.errstate(over="ignore"):
+        probability: FloatArray = 1.0 / (1.0 + np.exp(-linear_predictor))
     return probability
