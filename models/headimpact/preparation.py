@@ -100,7 +100,8 @@ def prepare(recording: Recording) -> Preparation:
     if recording.constrained_plane is not None:
         in_head = {name: _constrain(name, s, recording.constrained_plane, notes) for name, s in in_head.items()}
     rate, start_s, aligned = _one_time_base(in_head)
-    _require_bounds(aligned)
+    if sources[1] == "five_point_stencil":
+        _require_derived_within(aligned["angular_acceleration"])
     aligned = _at_head_cg(aligned, recording)
     start_ms = (start_s - clock_start_s) * 1000.0 - (recording.pre_trigger_ms or 0.0)
     kinematics = HeadKinematics(
@@ -130,6 +131,7 @@ def _require_motion(signals: list[tuple[SignalName, Signal]]) -> None:
             raise TraceError(
                 "unknown-unit", f"The {words(name)} must be in {' or '.join(UNITS_OF[name])}.", signal=name
             )
+        _require_time_base(name, signal)
         finite = np.isfinite(signal.values)
         if not finite.all():
             index, axis = np.argwhere(~finite)[0]
@@ -142,6 +144,16 @@ def _require_motion(signals: list[tuple[SignalName, Signal]]) -> None:
             )
     if all((signal.values == signal.values[0]).all() for _, signal in signals):
         raise TraceError("constant-signal", "Every channel of every signal is constant: nothing moved.")
+
+
+def _require_time_base(name: SignalName, signal: Signal) -> None:
+    """Refuse a signal whose times are not known, or known twice."""
+    if (signal.sample_rate_hz is None) == (signal.time_s is None):
+        raise TraceError(
+            "time-base", f"The {words(name)} must have either a sample rate or time stamps, and not both.", signal=name
+        )
+    if signal.time_s is not None and signal.time_s.shape != signal.values.shape[:1]:
+        raise TraceError("stamp-count", f"The {words(name)} must have one time stamp per sample.", signal=name)
 
 
 def _uniform(name: SignalName, signal: Signal, clock_start_s: float, notes: list[QualityNote]) -> _Uniform:
@@ -229,11 +241,18 @@ def _require_within(name: SignalName, values: FloatArray) -> None:
     )
 
 
-def _require_bounds(aligned: dict[str, FloatArray]) -> None:
-    """The same bound for angular acceleration that was derived, and so not checked as sent."""
-    alpha = aligned.get("angular_acceleration")
-    if alpha is not None:
-        _require_within("angular_acceleration", alpha)
+def _require_derived_within(alpha: FloatArray) -> None:
+    """The same bound for angular acceleration that was derived, and so not checked as sent.
+
+    The velocity is to blame, but no one sample of it.
+    """
+    bound = QUALITY_LIMITS["angular_acceleration"]["refused"]
+    if alpha.max() > bound or alpha.min() < -bound:
+        raise TraceError(
+            "value-out-of-range",
+            f"The derivative of the angular velocity must stay within {bound:g} rad/s^2; check its unit and its rate.",
+            signal="angular_velocity",
+        )
 
 
 def _notes_as_sent(recording: Recording, sent: dict[SignalName, _Uniform]) -> Iterator[QualityNote]:

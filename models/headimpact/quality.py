@@ -105,7 +105,8 @@ def _saturated(channels: Sequence[Channel], magnitude: FloatArray, peaks: FloatA
     moving = ~(magnitude == peaks).all(axis=0)
     for column in np.flatnonzero(runs.any(axis=0) & moving).tolist():
         channel = channels[column]
-        count = int(runs[:, column].sum()) + limits["run"] - 1
+        # a sample belongs to a run that starts at it or at one of the two before it
+        count = np.count_nonzero(np.convolve(runs[:, column], np.ones(limits["run"])))
         yield _warning(
             "saturated",
             channel,
@@ -171,6 +172,8 @@ def check_angular_acceleration(supplied: FloatArray, derived: FloatArray) -> Ite
     """Supplied angular acceleration against the derivative of the angular velocity, on one time base."""
     bound = QUALITY_LIMITS["consistency"]["minimum_correlation"]
     a, b = supplied.ravel(), derived.ravel()
+    if not a.any() and not b.any():
+        return
     a, b = a - a.mean(), b - b.mean()
     scale = float(np.sqrt((a @ a) * (b @ b)))
     correlation = float(a @ b) / scale if scale > 0 else 0.0
