@@ -21,6 +21,8 @@ _RULES: Mapping[str, tuple[str, str]] = {
     "extra_forbidden": ("unknown-field", "This field is not known here."),
     "finite_number": ("not-finite", "A number must be finite: NaN and Infinity are refused."),
     "float_type": ("wrong-type", "A number is needed."),
+    "float_parsing": ("wrong-type", "A number is needed."),
+    "json_invalid": ("not-json", "Text that begins with a brace must be JSON."),
     "int_type": ("wrong-type", "A whole number is needed."),
     "string_type": ("wrong-type", "Text is needed."),
     "bool_type": ("wrong-type", "true or false is needed."),

@@ -93,12 +93,15 @@ class _Head:
         if not signals:
             raise _fault("No head channel of this occupant has its three curves in the archive.", "no-signal")
         mapping = preset_named(PRESET).mapping
-        start_s = min(float(curve.stamps_s[0]) for curves in signals.values() for curve in curves)
+        signals = self._aligned(signals)
+        start_s = min(float(curves[0].stamps_s[0]) for curves in signals.values())
+        stamped = _rates_differ(signals)
+        sent: dict[str, Any] = {name: _signal(curves, stamped=stamped) for name, curves in signals.items()}
         recording = Recording(
             axes=mapping.axes or "anatomical",
             low_pass=PAPER if mapping.filter is None else low_pass(mapping.filter),
             pre_trigger_ms=round(-1000.0 * start_s, 9) if start_s <= 0.0 else None,
-            **self._signals(signals),
+            **sent,
         )
         return ImpactRecord(
             recording=recording,
@@ -142,14 +145,12 @@ class _Head:
             raise _fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
         return _Curve(channel, values, stamps, rate)
 
-    def _signals(self, curves: dict[SignalName, list[_Curve]]) -> dict[str, Any]:
-        """The signals on rates, if all curves are sampled alike; else on their own stamps, on one clock."""
-        every = [curve for three in curves.values() for curve in three]
-        if any(curve.rate != every[0].rate for curve in every):
-            return {name: _stamped(_common(three)) for name, three in curves.items()}
-        common = _common(every)
-        cut = {id(before): after for before, after in zip(every, common, strict=True)}
-        return {name: _stated([cut[id(curve)] for curve in three]) for name, three in curves.items()}
+    def _aligned(self, curves: dict[SignalName, list[_Curve]]) -> dict[SignalName, list[_Curve]]:
+        """The curves cut to what they share: all of them if they are sampled alike, else those of each signal."""
+        if _rates_differ(curves):
+            return {name: _common(three) for name, three in curves.items()}
+        cut = iter(_common([curve for three in curves.values() for curve in three]))
+        return {name: [next(cut) for _ in three] for name, three in curves.items()}
 
     def _note(self, code: str, detail: str, channel: Channel) -> None:
         self.notes.append(QualityNote(code, "warning", detail, channel.signal, channel.axis))
@@ -200,14 +201,19 @@ def _common(curves: list[_Curve]) -> list[_Curve]:
     ]
 
 
-def _stated(curves: list[_Curve]) -> Signal:
-    rate = curves[0].rate
-    return Signal(values=_values(curves), unit=_unit(curves), sample_rate_hz=rate, declared_range=_range(curves))
+def _rates_differ(curves: dict[SignalName, list[_Curve]]) -> bool:
+    return len({curve.rate for three in curves.values() for curve in three}) > 1
 
 
-def _stamped(curves: list[_Curve]) -> Signal:
-    stamps = curves[0].stamps_s
-    return Signal(values=_values(curves), unit=_unit(curves), time_s=stamps, declared_range=_range(curves))
+def _signal(curves: list[_Curve], *, stamped: bool) -> Signal:
+    """One signal on its rate or, where the signals' rates differ, on its stamps: they are on one clock."""
+    return Signal(
+        values=_values(curves),
+        unit=_unit(curves),
+        sample_rate_hz=None if stamped else curves[0].rate,
+        time_s=curves[0].stamps_s if stamped else None,
+        declared_range=_range(curves),
+    )
 
 
 def _values(curves: list[_Curve]) -> FloatArray:

@@ -1,0 +1,219 @@
+"""CSV files: what is read whatever the dialect, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ingest_files import GENERIC, codes, csv_text, one, outcome, read, refused, six_axis, statuses
+
+from headimpact_service.errors import Problem
+from headimpact_service.ingest import csv_format
+from headimpact_service.ingest.record import ImpactRecord
+
+
+def samples_of(record: ImpactRecord) -> np.ndarray:
+    recording = record.recording
+    assert recording.linear_acceleration is not None
+    assert recording.angular_velocity is not None
+    return np.concatenate((recording.linear_acceleration.values, recording.angular_velocity.values), axis=1)
+
+
+def test_a_table_is_read_to_the_last_bit():
+    samples = np.random.default_rng(1).normal(size=(50, 6)) * 1e-3
+    record = one(csv_text(samples))
+    np.testing.assert_array_equal(samples_of(record), samples)
+    assert record.recording.linear_acceleration is not None
+    assert record.recording.linear_acceleration.sample_rate_hz == 1000.0
+    assert record.metadata == {"format": "csv", "preset": "generic_six_axis"}
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "latin-1"])
+def test_dialects_make_no_difference(delimiter: str, ending: str, coding: str):
+    text = csv_text(delimiter=delimiter, heading=GENERIC.replace("ax_g", "Ax (g) "), before={"naïve": "é"})
+    record = one(text.replace("\n", ending).encode(coding))
+    np.testing.assert_array_equal(samples_of(record), six_axis())
+
+
+def test_quotes_blank_lines_comments_and_empty_cells_at_the_end_are_passed_over():
+    lines = csv_text().splitlines()
+    quoted = [",".join(f'"{cell}"' for cell in line.split(",")) for line in lines]
+    for text in (
+        "\n".join(quoted),
+        "# made by a laboratory\n\n" + "\n\n".join(lines) + "\n\n\n",
+        "\n".join([lines[0], *(f"{line},," for line in lines[1:])]),
+        "\n".join([*lines, "," * 6, " , ,,,,,"]),
+        "\n".join([lines[0], *(line.replace(",", " , ") for line in lines[1:])]),
+    ):
+        np.testing.assert_array_equal(samples_of(one(text)), six_axis())
+
+
+def test_a_quoted_heading_may_hold_the_separator():
+    heading = csv_text(before={'"place, time"': '"Dublin, noon"'})
+    np.testing.assert_array_equal(samples_of(one(heading)), six_axis())
+
+
+def test_blocks_are_joined_in_order(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(csv_format, "ROWS_AT_ONCE", 7)
+    samples = np.random.default_rng(2).normal(size=(50, 6))
+    np.testing.assert_array_equal(samples_of(one(csv_text(samples))), samples)
+    np.testing.assert_array_equal(samples_of(one(csv_text(samples, before={"label": '"a"'}))), samples)
+
+
+def grouped(*names: str) -> str:
+    parts = [csv_text(six_axis() * (1 + i), before={"external_id": name}) for i, name in enumerate(names)]
+    return parts[0] + "".join(part.split("\n", 1)[1] for part in parts[1:])
+
+
+def test_one_file_may_hold_several_impacts_in_the_order_in_which_they_begin():
+    records = read(grouped("b", "a", "c"))
+    assert [r.external_id for r in records if isinstance(r, ImpactRecord)] == ["b", "a", "c"]
+    for number, record in enumerate(records):
+        assert isinstance(record, ImpactRecord)
+        np.testing.assert_array_equal(samples_of(record), six_axis() * (1 + number))
+
+
+def test_interleaved_impacts_are_sorted_out():
+    lines = grouped("a", "b").splitlines()
+    mixed = [lines[0], *(line for pair in zip(lines[1:41], lines[41:], strict=True) for line in pair)]
+    first, second = read("\n".join(mixed))
+    assert isinstance(first, ImpactRecord)
+    assert isinstance(second, ImpactRecord)
+    np.testing.assert_array_equal(samples_of(first), six_axis())
+    np.testing.assert_array_equal(samples_of(second), six_axis() * 2)
+
+
+@pytest.mark.parametrize(
+    "cell", ["", "nan", "NaN", "inf", "-Infinity", "1e400", "1_000", "١", "0x10", "NOVALUE", "1,5"]
+)
+def test_a_bad_cell_is_the_fault_of_its_own_impact(cell: str):
+    lines = grouped("a", "b", "c").splitlines()
+    row = lines[45].split(",")
+    row[3] = f'"{cell}"' if "," in cell else cell
+    lines[45] = ",".join(row)
+    good, bad, last = read("\n".join(lines))
+    assert isinstance(good, ImpactRecord)
+    assert isinstance(last, ImpactRecord)
+    assert isinstance(bad, Problem)
+    assert (bad.slug, bad.errors[0].code) == ("unreadable-file", "missing-sample")
+    assert "column 4" in bad.detail
+    assert "sample 4" in bad.detail
+    assert "row 41" in bad.detail
+
+
+def test_decimal_commas_are_refused_as_what_they_are():
+    problem = refused(csv_text(delimiter=";").replace(".", ","))
+    assert problem.slug == "unreadable-file"
+    assert "decimal point" in problem.detail
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "empty"),
+        ("\n\n\n", "empty"),
+        ("# only a comment\n", "no line of headings"),
+        (GENERIC, "no samples"),
+        (GENERIC + "\n\n,,,,,,\n", "no samples"),
+        ("one column\n1\n2\n", "separated by"),
+        ("a,b;c\n1,2;3\n", "two separators"),
+        (csv_text() + "1,2,3\n", "has 3 cells where the headings have 7"),
+        (csv_text() + "1,2,3,4,5,6,7,8\n", "has 8 cells where the headings have 7"),
+        (csv_text() + '"1,2,3\n', "quotes"),
+        (csv_text() + '1,"2"2,3,4,5,6,7\n', "quotes"),
+        (csv_text(np.zeros((5000, 6))) + "\0", "NUL"),
+        (csv_text() + "1" * 300_000, "262144 bytes"),
+        (",".join(f"c{i}" for i in range(1025)) + "\n", "1024 columns"),
+        ("x,y\n1,2\n", "The columns of no signal were found"),
+    ],
+)
+def test_a_file_that_cannot_be_read_says_why(text: str, said: str):
+    problem = refused(text)
+    assert problem.slug == "unreadable-file"
+    assert said in problem.detail
+
+
+def test_a_single_impact_has_at_most_20000_samples():
+    problem = refused(csv_text(np.zeros((20_001, 6))))
+    assert "20000 samples" in problem.detail
+    both = csv_text(np.ones((20_001, 6)), before={"external_id": "a"})
+    assert refused(both).errors[0].code == "sample-count"
+
+
+def test_the_number_of_impacts_is_bounded():
+    assert refused(grouped("a", "b", "c"), max_impacts=2).slug == "import-too-large"
+
+
+def test_no_time_and_no_rate_is_refused_and_a_rate_given_beside_is_taken():
+    text = "\n".join(line.split(",", 1)[1] for line in csv_text().splitlines())
+    problem = refused(text)
+    assert codes(problem) == [("sample_rate_hz", "rate-missing")]
+    recording = one(text, sample_rate_hz=2000.0).recording
+    assert recording.angular_velocity is not None
+    assert recording.angular_velocity.sample_rate_hz == 2000.0
+
+
+def test_a_rate_given_beside_the_file_overrides_its_times():
+    recording = one(csv_text(), sample_rate_hz=3200.0).recording
+    assert recording.linear_acceleration is not None
+    assert recording.linear_acceleration.sample_rate_hz == 3200.0
+
+
+def test_jittered_stamps_are_kept_from_the_first_one_on():
+    stamps_us = 26_623_464 + 1000 * np.arange(40) + np.where(np.arange(40) % 3 == 1, 40, 0)
+    lines = csv_text(heading=GENERIC.replace("t_s", "TimeStamp(Micosecond)")).splitlines()
+    rows = [f"{stamp},{line.split(',', 1)[1]}" for stamp, line in zip(stamps_us, lines[1:], strict=True)]
+    signal = one("\n".join([lines[0], *rows])).recording.linear_acceleration
+    assert signal is not None
+    assert signal.sample_rate_hz is None
+    np.testing.assert_allclose(signal.time_s, (stamps_us - stamps_us[0]) / 1e6, rtol=1e-15, atol=0)
+
+
+def test_times_from_before_zero_to_after_it_count_from_the_trigger():
+    lines = csv_text(heading=GENERIC.replace("t_s", "t_ms")).splitlines()
+    rows = [f"{index - 10},{line.split(',', 1)[1]}" for index, line in enumerate(lines[1:])]
+    assert one("\n".join([lines[0], *rows])).recording.pre_trigger_ms == 10.0
+    assert one(csv_text()).recording.pre_trigger_ms is None
+
+
+def test_fields_beside_the_file_override_what_is_in_it():
+    text = csv_text(before={"external_id": "e", "athlete_id": "p-1", "device_serial": "d-1"})
+    record = one(text)
+    assert (record.external_id, record.athlete_external_id, record.device_serial) == ("e", "p-1", "d-1")
+    record = one(text, athlete="p-2", device="d-2", axes="sae_j211", filename="x.csv")
+    assert (record.athlete_external_id, record.device_serial) == ("p-2", "d-2")
+    assert record.recording.axes == "sae_j211"
+    assert record.metadata["file"] == "x.csv"
+
+
+def test_names_in_cells_are_bounded_and_printable():
+    assert codes(refused(csv_text(before={"external_id": "e" * 201}))) == [("external_id", "name-form")]
+    assert codes(refused(csv_text(before={"athlete": "p\x07"}))) == [("athlete", "name-form")]
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(text=st.text(alphabet='0123456789.,;-+eE"\n\r\t _#nax\0é', max_size=300), headed=st.booleans())
+def test_any_text_is_read_or_refused(text: str, headed: bool):
+    assert statuses(outcome(GENERIC + "\n" + text if headed else text)) <= {413, 415, 422}
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.binary(max_size=300))
+def test_any_bytes_are_read_or_refused(data: bytes):
+    assert statuses(outcome(data)) <= {413, 415, 422}
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    values=st.lists(
+        st.lists(st.floats(-1e3, 1e3, allow_subnormal=False), min_size=6, max_size=6), min_size=3, max_size=30
+    ),
+    quote=st.booleans(),
+)
+def test_whatever_numbers_are_written_come_back(values: list[list[float]], quote: bool):
+    samples = np.array(values)
+    labels = {"label": '"x"'} if quote else None
+    np.testing.assert_array_equal(samples_of(one(csv_text(samples, before=labels))), samples)

@@ -1,0 +1,172 @@
+"""JSON and NDJSON files: one impact or many, each with its own fate."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ingest_files import body, codes, encoded, one, outcome, read, refused, statuses
+
+from headimpact.filtering import NO_FILTER
+from headimpact_service.errors import Problem
+from headimpact_service.ingest import ndjson_format
+from headimpact_service.ingest.digest import content_digest
+from headimpact_service.ingest.impact_reading import read_impact
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.record import ImpactRecord
+
+
+def ids(items: list[ImpactRecord | Problem]) -> list[str | None]:
+    return [item.external_id if isinstance(item, ImpactRecord) else item.slug for item in items]
+
+
+def lines(*documents: Any) -> bytes:
+    return b"\n".join(document if isinstance(document, bytes) else encoded(document) for document in documents)
+
+
+@pytest.mark.parametrize("indent", [None, 2])
+def test_a_file_of_one_impact_is_that_impact(indent: int | None):
+    record = one(json.dumps(body(), indent=indent))
+    assert content_digest(record) == content_digest(read_impact(encoded(body())))
+    assert record.metadata == {"format": "json"}
+
+
+@pytest.mark.parametrize("wrap", [lambda many: many, lambda many: {"data": many}, lambda many: {"impacts": many}])
+def test_a_file_may_hold_a_list(wrap: Any):
+    many = [body(external_id="a"), body(external_id="b", athlete=None)]
+    assert ids(read(json.dumps(wrap(many)))) == ["a", "b"]
+
+
+def test_a_bad_impact_of_a_list_is_its_own_problem():
+    bad = body(external_id="b")
+    bad["kinematics"]["angular_velocity"]["unit"] = "rpm"
+    first, second, third, last = read(json.dumps([body(external_id="a"), bad, 7, body(external_id="d")]))
+    assert ids([first, second, third, last]) == ["a", "invalid-payload", "invalid-payload", "d"]
+    assert isinstance(second, Problem)
+    assert codes(second) == [("/kinematics/angular_velocity/unit", "not-allowed")]
+    assert isinstance(third, Problem)
+    assert codes(third) == [("", "wrong-type")]
+
+
+def test_numbers_that_are_not_finite_or_no_numbers_are_refused_in_files_too():
+    text = json.dumps(body()).replace("30.0,", "%s,", 1)
+    for value in ("NaN", "Infinity", "1e400", "true", '"1"', "null", "1" + "0" * 400):
+        problem = refused(text % value)
+        assert problem.slug == "invalid-payload"
+        assert problem.errors[0].pointer is not None
+        assert problem.errors[0].pointer.startswith("/kinematics/linear_acceleration/x/")
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"{", "not JSON"),
+        (b"[" * 10_000, "recursion limit"),
+        (b'[{"a": "\\ud800"}]', "not JSON"),
+        (b"[]", "no impact"),
+        (b'{"data": []}', "no impact"),
+    ],
+)
+def test_a_file_that_is_not_json_or_empty_is_refused(data: bytes, said: str):
+    problem = refused(data)
+    assert problem.slug == "unreadable-file"
+    assert said in problem.detail
+
+
+def test_ndjson_is_an_impact_a_line_and_empty_lines_are_passed_over():
+    data = b"\xef\xbb\xbf" + lines(body(external_id="a"), b"", b"  ", body(external_id="b")) + b"\r\n"
+    assert ids(read(data)) == ["a", "b"]
+
+
+def test_a_bad_line_is_that_lines_problem():
+    data = lines(body(external_id="a"), b'{"kinematics": ', body(external_id="c", colour="red"), body(external_id="d"))
+    items = read(data)
+    assert ids(items) == ["a", "unreadable-file", "invalid-payload", "d"]
+    assert isinstance(items[1], Problem)
+    assert "line 2" in items[1].detail
+    assert isinstance(items[2], Problem)
+    assert codes(items[2]) == [("/colour", "unknown-field")]
+
+
+def test_one_line_is_ndjson_by_name_or_type():
+    data = lines(b'{"kinematics": ')
+    assert refused(data, filename="x.NDJSON").slug == "unreadable-file"
+    assert len(read(data, filename="x.jsonl")) == 1
+    assert len(read(data, content_type="application/x-ndjson; charset=utf-8")) == 1
+
+
+def test_a_line_is_bounded(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(ndjson_format, "MAX_LINE", 5000)
+    items = read(lines(body(external_id="a"), b"{" + b" " * 6000 + b"}", body(external_id="c")))
+    assert ids(items) == ["a", "unreadable-file", "c"]
+
+
+def test_the_number_of_impacts_is_bounded():
+    for data in (json.dumps([body()] * 3).encode(), lines(body(), body(), body())):
+        assert len(read(data, max_impacts=3)) == 3
+        with pytest.raises(Problem) as caught:
+            read(data, max_impacts=2)
+        assert caught.value.slug == "import-too-large"
+
+
+@pytest.mark.parametrize("data", [json.dumps([body(athlete={"id": "ath_1"})]).encode(), lines(body(), b"{")])
+def test_fields_beside_the_file_override_what_is_in_it(data: bytes):
+    when = datetime(2027, 1, 1, tzinfo=UTC)
+    record = read(
+        data,
+        athlete="p-9",
+        device="d-9",
+        occurred_at=when,
+        axes="sae_j211",
+        low_pass=NO_FILTER,
+        sample_rate_hz=2000.0,
+        filename="delivery.json",
+    )[0]
+    assert isinstance(record, ImpactRecord)
+    assert (record.athlete_id, record.athlete_external_id, record.device_serial) == (None, "p-9", "d-9")
+    assert record.occurred_at == when
+    assert record.recording.axes == "sae_j211"
+    assert record.recording.low_pass is NO_FILTER
+    assert [signal.sample_rate_hz for _, signal in record.recording.signals()] == [2000.0, 2000.0]
+    assert record.metadata == {"format": "json", "file": "delivery.json"}
+
+
+def test_a_zone_beside_the_file_places_its_local_times():
+    data = json.dumps(body(occurred_at="2026-07-01T12:00:00"))
+    assert codes(refused(data)) == [("/occurred_at", "offset-missing")]
+    assert one(data, time_zone="Europe/Dublin").occurred_at == datetime(2026, 7, 1, 11, tzinfo=UTC)
+
+
+def test_a_file_that_names_its_fields_takes_neither_preset_nor_mapping():
+    for data in (json.dumps(body()).encode(), lines(body(), body())):
+        assert "neither preset nor mapping" in refused(data, preset="swa").detail
+        assert "neither preset nor mapping" in refused(data, mapping=Mapping.model_validate({})).detail
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=10,
+)
+places = st.lists(
+    st.sampled_from(["kinematics", "linear_acceleration", "x", "unit", "filter", "context", "mounting", "device"]),
+    min_size=1,
+    max_size=3,
+)
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(steps=places, value=json_values)
+def test_any_value_anywhere_is_read_or_refused(steps: list[str], value: Any):
+    document = body()
+    node = document
+    for step in steps[:-1]:
+        node = node.setdefault(step, {}) if isinstance(node.get(step, {}), dict) else node
+    node[steps[-1]] = value
+    items = outcome(json.dumps([document]))
+    assert len(items) == 1
+    assert statuses(items) <= {422}

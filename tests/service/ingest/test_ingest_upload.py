@@ -1,0 +1,109 @@
+"""What a file is, told by its content."""
+
+from __future__ import annotations
+
+import gzip
+
+import numpy as np
+import pytest
+from ingest_files import body, csv_text, encoded, one, refused, six_axis, zipped
+
+from headimpact_service.ingest.detect import Kind, detect
+from headimpact_service.ingest.stamps import nominal_rate
+from headimpact_service.ingest.upload import READERS
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (zipped({"a": "b"}), Kind.ZIP),
+        (zipped({}), Kind.ZIP),
+        (b' \n {"a": 1}', Kind.JSON),
+        (b'\xef\xbb\xbf[{"a": 1}]', Kind.JSON),
+        (b'{"a": 1}\n{"a": 2}\n', Kind.NDJSON),
+        (b'{"a": 1}\r\n\r\n{"a": 2}', Kind.NDJSON),
+        (b'{"a":\n {"b": 1}\n}', Kind.JSON),
+        (b"a,b\n1,2\n", Kind.CSV),
+        (b"\xe9,b\n1,2\n", Kind.CSV),
+    ],
+)
+def test_the_content_tells_the_kind(data: bytes, kind: Kind):
+    assert detect(data) is kind
+    assert detect(data, filename="misleading.pdf", content_type="image/png") is kind
+
+
+def test_every_kind_has_its_reader():
+    assert set(READERS) == set(Kind)
+
+
+@pytest.mark.parametrize(
+    ("data", "named"),
+    [
+        (gzip.compress(b"a,b\n"), "gzip"),
+        (b"PAR1" + b"\0" * 8, "Parquet"),
+        (b"ARROW1\0\0", "Arrow IPC"),
+        (b"MATLAB 5.0 MAT-file, Platform: x", "MATLAB"),
+        (b"\x89HDF\r\n\x1a\n", "HDF5"),
+        (b"%PDF-1.7", "PDF"),
+        (b"\x7fELF\0\0\0", "not known"),
+        ("a,b\n1,2".encode("utf-16"), "not known"),
+    ],
+)
+def test_a_kind_that_is_not_read_is_415_and_named(data: bytes, named: str):
+    problem = refused(data)
+    assert problem.slug == "unsupported-media-type"
+    assert problem.status == 415
+    assert named in problem.detail
+    assert "CSV" in problem.detail
+
+
+def test_a_zip_of_something_else_is_415():
+    assert refused(zipped({"readme.txt": "hello"})).slug == "unsupported-media-type"
+    assert refused(zipped({})).slug == "unsupported-media-type"
+
+
+def test_an_empty_file_is_refused():
+    for data in (b"", b"  \n", b"\xef\xbb\xbf"):
+        assert refused(data).slug == "unreadable-file"
+
+
+def test_a_preset_is_known_before_the_file_is_looked_at():
+    assert refused(b"", preset="nowhere").slug == "invalid-parameter"
+
+
+def test_csv_and_json_of_one_impact_give_the_same_signals():
+    by_table, by_json = one(csv_text(six_axis())).recording, one(encoded(body())).recording
+    for (name, left), (_, right) in zip(by_table.signals(), by_json.signals(), strict=True):
+        np.testing.assert_array_equal(left.values, right.values, err_msg=name)
+        assert left.sample_rate_hz == right.sample_rate_hz
+
+
+@pytest.mark.parametrize("rate", [500.0, 1000.0, 1024.0, 1600.0, 3200.0, 10_000.0, 12_500.0, 20_000.0, 100_000.0])
+@pytest.mark.parametrize("start", [0.0, -0.05])
+def test_stamps_written_in_decimals_say_the_whole_rate(rate: float, start: float):
+    stamps = np.array([float(f"{start + i / rate:.10f}") for i in range(400)])
+    assert nominal_rate(stamps) == rate
+
+
+def test_a_rate_that_is_no_whole_number_stays_as_the_stamps_have_it():
+    assert nominal_rate(np.arange(100) / 1000.25) == pytest.approx(1000.25, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        [],
+        [0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 2.0, 1.0],
+        [2.0, 1.0, 0.0],
+        [0.0, 1.0, 2.001],
+        [0.0, 1.0, 1.0, 3.0],
+        [0.0, float("nan"), 2.0],
+        [0.0, 1.0, float("inf")],
+        [-1e308, 0.0, 1e308],
+    ],
+)
+def test_stamps_that_are_not_uniform_say_no_rate(stamps: list[float]):
+    with np.errstate(all="ignore"):
+        assert nominal_rate(np.array(stamps)) is None
