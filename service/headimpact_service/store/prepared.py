@@ -12,7 +12,6 @@ from weakref import WeakKeyDictionary
 
 from sqlalchemy import Connection, CursorResult, Select
 from sqlalchemy.engine import Dialect
-from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.dml import Insert
 
 _Convert = Callable[[Any], Any]
@@ -67,10 +66,8 @@ class Prepared:
 
     def _compile(self, dialect: Dialect) -> _Plan:
         compiled = self._statement.compile(dialect=dialect, column_keys=self._columns)
-        if not isinstance(compiled, SQLCompiler):
-            raise TypeError("only queries and inserts can be prepared")
-        names = compiled.positiontup if compiled.positional else list(compiled.binds)
-        types = {name: compiled.binds[name].type.dialect_impl(dialect) for name in compiled.binds}
+        types = {name: parameter.type.dialect_impl(dialect) for parameter, name in compiled.bind_names.items()}
+        names = compiled.positiontup if compiled.positional else list(types)
         given = {name: value for name, value in compiled.params.items() if value is not None}
         return _Plan(
             sql=str(compiled),
