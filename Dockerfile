@@ -41,11 +41,10 @@ RUN sed '/^$/,$d; s/^Suites:.*/Suites: forky/' /etc/apt/sources.list.d/debian.so
 COPY --from=build /opt/headimpact /opt/headimpact
 RUN install --directory --owner 10001 --group 10001 --mode 0700 /data
 
-# The root may be read-only: the database and what an upload spools to disk are the only files written, all in /data.
+# The root may be read-only: the database in /data is all that is written (uploads are bounded and stay in memory).
 ENV PATH=/opt/headimpact/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     PYTHONUNBUFFERED=1 \
-    TMPDIR=/data \
     HEADIMPACT_DATABASE_URL=sqlite:////data/headimpact.db \
     HEADIMPACT_HOST=0.0.0.0 \
     HEADIMPACT_PORT=8000
