@@ -87,7 +87,7 @@ class HeadKinematics:
     def peak_angular_velocity_components(self) -> FloatArray:
         """Largest absolute value of each component [rad/s]."""
         lowest, highest = self.angular_velocity_extremes
-        return np.maximum(-lowest, highest)
+        return np.abs(np.maximum(-lowest, highest))
 
     @cached_property
     def peak_angular_acceleration_components(self) -> FloatArray:
@@ -139,7 +139,8 @@ def squared_norm(x: FloatArray) -> FloatArray:
 
 def largest_magnitude(x: FloatArray) -> FloatArray:
     """Maximum of the absolute value over time."""
-    magnitude: FloatArray = np.maximum(-np.minimum.reduce(x, axis=0), largest(x))
+    # the outer abs only takes the sign off a zero
+    magnitude: FloatArray = np.abs(np.maximum(-np.minimum.reduce(x, axis=0), largest(x)))
     return magnitude
 
 
