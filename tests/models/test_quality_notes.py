@@ -1,0 +1,277 @@
+"""Each quality note at its bound and just inside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from waveforms import burst, recording
+
+from headimpact.filtering import NO_FILTER
+from headimpact.kinematics import HeadKinematics, differentiate
+from headimpact.preparation import Preparation, prepare
+from headimpact.quality import QualityNote, check_truncation, check_units
+from headimpact.recording import Recording, Signal
+from headimpact.scoring import score
+
+GENERATOR = np.random.default_rng(5)
+A, W, ALPHA = burst(GENERATOR, 100, 30.0), burst(GENERATOR, 100, 8.0), burst(GENERATOR, 100, 900.0)
+
+
+def notes(given: Recording, code: str) -> list[QualityNote]:
+    return [note for note in score(prepare(given)).quality if note.code == code]
+
+
+def linear(a: np.ndarray, **given: float) -> Recording:
+    return Recording(Signal(a, "g", 1000.0, **given), low_pass=NO_FILTER)
+
+
+def at(x: np.ndarray, index: int, axis: int, value: float) -> np.ndarray:
+    changed = x.copy()
+    changed[index, axis] = value
+    return changed
+
+
+def test_a_clean_recording_draws_no_note():
+    assert score(prepare(recording())).quality == ()
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit", "bound"),
+    [
+        ("linear_acceleration", "g", 250.0),
+        ("angular_velocity", "rad/s", 70.0),
+        ("angular_acceleration", "rad/s^2", 25_000.0),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_extreme_values_are_named_with_their_channel(signal, unit, bound, sign):
+    x = {"linear_acceleration": A, "angular_velocity": W, "angular_acceleration": ALPHA}[signal]
+    beyond = recording(**{signal: Signal(at(x, 40, 1, sign * bound * 1.001), unit, 1e3)})
+    (note,) = notes(beyond, "extreme_value")
+    assert (note.signal, note.channel, note.severity) == (signal, "y", "warning")
+    assert notes(recording(**{signal: Signal(at(x, 40, 1, sign * bound), unit, 1e3)}), "extreme_value") == []
+
+
+@pytest.mark.parametrize("level", [0.0, -3.5])
+def test_a_constant_channel_is_named(level):
+    x = A.copy()
+    x[:, 2] = level
+    (note,) = notes(linear(x), "constant_channel")
+    assert (note.signal, note.channel, note.severity) == ("linear_acceleration", "z", "warning")
+    assert notes(linear(at(x, 50, 2, level + 1e-6)), "constant_channel") == []
+
+
+@pytest.mark.parametrize(("run", "noted"), [(2, False), (3, True), (5, True)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_flat_run_of_three_samples_at_the_maximum_is_saturation(run, noted, sign):
+    x = A.copy()
+    x[40 : 40 + run, 0] = sign * 90.0
+    found = notes(linear(x), "saturated")
+    assert bool(found) == noted
+    if noted:
+        assert (found[0].signal, found[0].channel) == ("linear_acceleration", "x")
+        assert f"{run} samples" in found[0].detail
+
+
+def test_the_samples_of_every_flat_run_are_counted():
+    x = A.copy()
+    x[30:33, 0] = x[60:64, 0] = 90.0
+    (note,) = notes(linear(x), "saturated")
+    assert "7 samples" in note.detail
+
+
+@pytest.mark.parametrize(("level", "noted"), [(0.951, True), (0.949, False)])
+def test_equal_samples_within_5_percent_of_the_declared_range_are_saturation(level, noted):
+    # a clipped sensor whose filter or offset keeps it just under its range; the peak is elsewhere
+    x = A.copy()
+    x[40:43, 1] = level * 100.0
+    x[60, 1] = 99.9
+    assert bool(notes(linear(x, declared_range=100.0), "saturated")) == noted
+    assert notes(linear(x), "saturated") == []
+
+
+def test_the_declared_range_is_in_the_unit_of_its_signal():
+    # a gyroscope of 2000 deg/s clips at 34.9 rad/s
+    degrees = np.rad2deg(W)
+    degrees[40:43, 1] = 1950.0
+    degrees[60, 1] = 1990.0
+    clipped = recording(angular_velocity=Signal(degrees, "deg/s", 1e3, declared_range=2000.0))
+    assert [note.channel for note in notes(clipped, "saturated")] == ["y"]
+
+
+@pytest.mark.parametrize(("end", "index"), [("first", 0), ("last", -1)])
+@pytest.mark.parametrize(("ratio", "noted"), [(5.01, True), (4.99, False)])
+def test_an_edge_sample_far_off_its_neighbours_is_a_glitch(end, index, ratio, noted):
+    # its step is over 5 times the largest of the five beside it and over a fifth of the channel's peak
+    x = np.zeros((100, 3))
+    x[:, 0] = np.arange(100) % 2  # steps of 1
+    x[50, 1] = 1.0
+    inner = 1 if index == 0 else -2
+    x[index, 0] = x[inner, 0] + ratio
+    found = notes(linear(x), "edge_glitch")
+    assert bool(found) == noted
+    if noted:
+        assert (found[0].channel, found[0].signal) == ("x", "linear_acceleration")
+        assert end in found[0].detail
+
+
+@pytest.mark.parametrize(("share", "noted"), [(0.201, True), (0.199, False)])
+def test_an_edge_step_that_is_small_beside_the_peak_is_no_glitch(share, noted):
+    x = np.zeros((100, 3))
+    x[50:53, 0] = [50.0, 100.0, 50.0]
+    x[0, 0] = 100.0 * share
+    assert bool(notes(linear(x), "edge_glitch")) == noted
+
+
+def test_channels_that_are_the_same_numbers_are_named():
+    w = W.copy()
+    w[:, 2] = A[:, 0]
+    doubled = Recording(Signal(A, "g", 1e3), Signal(w, "rad/s", 1e3))
+    (note,) = notes(doubled, "identical_channels")
+    assert (note.signal, note.channel) == ("linear_acceleration", "x")
+    assert "angular velocity on z" in note.detail
+    w[99, 2] += 1e-9
+    assert notes(Recording(Signal(A, "g", 1e3), Signal(w, "rad/s", 1e3)), "identical_channels") == []
+
+
+@pytest.mark.parametrize(("rate_hz", "noted"), [(500.0, True), (998.0, True), (999.5, False), (1000.0, False)])
+def test_a_rate_under_1_khz_is_noted(rate_hz, noted):
+    # stamps read to the microsecond scatter a 1 kHz device by parts per thousand
+    found = notes(Recording(Signal(A, "g", rate_hz)), "low_sample_rate")
+    assert [note.signal for note in found] == (["linear_acceleration"] if noted else [])
+
+
+@pytest.mark.parametrize(("jitter", "noted"), [(2e-6, True), (0.5e-6, False)])
+def test_stamps_are_resampled_beyond_a_millionth_of_a_step(jitter, noted):
+    time_s = np.arange(100) / 1000.0
+    time_s[50] += jitter * 1e-3
+    found = notes(Recording(Signal(A, "g", time_s=time_s)), "resampled")
+    assert [note.severity for note in found] == (["note"] if noted else [])
+
+
+def with_ratio(ratio: float) -> HeadKinematics:
+    """Peaks whose R = PAA 0.07 m / (PLA 9.81) is `ratio`, at 100 g."""
+    a, alpha = np.zeros((100, 3)), np.zeros((100, 3))
+    a[50, 0], alpha[50, 1] = 100.0, ratio * 100.0 * 9.81 / 0.07
+    return HeadKinematics(1000.0, a, None, alpha)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "noted"), [(0.1199, True), (0.1201, False), (1.0, False), (1.999, False), (2.001, True)]
+)
+def test_the_unit_check_accepts_ratios_from_0_12_to_2(ratio, noted):
+    assert [note.code for note in check_units(with_ratio(ratio))] == (["implausible_units"] if noted else [])
+
+
+@pytest.mark.parametrize(
+    ("signal", "wrong"),
+    [("linear_acceleration", 9.80665), ("angular_velocity", 180 / np.pi)],
+    ids=["m/s^2 as g", "deg/s as rad/s"],
+)
+def test_a_wrong_unit_is_noticed_and_nothing_is_guessed(signal, wrong):
+    a, w = 0.15 * A, 0.15 * W  # a mild impact, so that no other bound is met
+    right = Recording(Signal(a, "g", 1e3), Signal(w, "rad/s", 1e3), low_pass=NO_FILTER)
+    assert notes(right, "implausible_units") == []
+    sent = getattr(right, signal)
+    changed = replace(right, **{signal: replace(sent, values=sent.values * wrong)})
+    (note,) = notes(changed, "implausible_units")
+    assert note.severity == "warning"
+    kinematics = prepare(changed).kinematics
+    kept = kinematics.linear_acceleration_g if signal == "linear_acceleration" else kinematics.angular_velocity
+    np.testing.assert_array_equal(kept, sent.values * wrong)
+
+
+def test_the_unit_check_needs_both_signals_and_motion_in_both():
+    whole = with_ratio(5.0)
+    assert list(check_units(replace(whole, angular_acceleration=None))) == []
+    assert list(check_units(replace(whole, linear_acceleration_g=None))) == []
+    assert list(check_units(replace(whole, angular_acceleration=np.zeros((100, 3))))) == []
+
+
+@pytest.mark.parametrize(
+    ("samples", "pre_trigger_ms", "noted"),
+    [(59, None, True), (60, None, False), (70, 10.0, False), (69, 10.0, True), (60, 0.0, False), (100, 60.0, True)],
+)
+def test_a_record_that_ends_before_60_ms_is_truncated(samples, pre_trigger_ms, noted):
+    # from the trigger where it is known, else from the start; a step of slack
+    x = np.zeros((samples, 3))
+    x[20:25] = 10.0
+    given = replace(linear(x), pre_trigger_ms=pre_trigger_ms)
+    found = notes(given, "record_truncated")
+    assert bool(found) == noted
+    if noted:
+        assert ("trigger" if pre_trigger_ms is not None else "start") in found[0].detail
+
+
+@pytest.mark.parametrize(("index", "noted"), [(0, True), (1, False), (98, False), (99, True)])
+def test_a_linear_peak_at_the_edge_is_truncation(index, noted):
+    x = np.ones((100, 3))
+    x[index] = 50.0
+    assert bool(notes(linear(x), "record_truncated")) == noted
+
+
+@pytest.mark.parametrize(("peak", "noted"), [(94, False), (95, True), (99, True)])
+def test_a_brain_angle_that_peaks_in_the_last_5_percent_is_truncation(peak, noted):
+    # 100 samples: the last 5 % begin after sample 94.05
+    kinematics = HeadKinematics(1000.0, None, None, np.ones((100, 3)))
+    found = list(check_truncation(kinematics, [40, peak, 0], pre_trigger_known=False))
+    assert bool(found) == noted
+    if noted:
+        assert "(y)" in found[0].detail
+
+
+def test_a_response_that_still_rises_at_the_end_is_truncation():
+    # half a pulse: the angle has not turned yet
+    alpha = np.zeros((100, 3))
+    alpha[85:, 2] = 2000.0
+    found = notes(Recording(angular_acceleration=Signal(alpha, "rad/s^2", 1e3)), "record_truncated")
+    assert "brain angle" in found[0].detail
+
+
+@pytest.mark.parametrize(("scale", "noted"), [(0.3, False), (2.0, True)])
+def test_a_supplied_angular_acceleration_that_is_not_the_derivative_is_noted(scale, noted):
+    # correlation under 0.9 between what is supplied and what follows from the velocity
+    own = differentiate(W, 1000.0)
+    other = np.random.default_rng(9).normal(size=own.shape) * own.std() * scale
+    correlation = np.corrcoef((own + other).ravel(), own.ravel())[0, 1]
+    assert (correlation < 0.9) == noted
+    given = Recording(None, Signal(W, "rad/s", 1e3), Signal(own + other, "rad/s^2", 1e3), low_pass=NO_FILTER)
+    found = notes(given, "angular_acceleration_mismatch")
+    assert bool(found) == noted
+    if noted:
+        assert f"{correlation:.3f}" in found[0].detail
+
+
+def test_a_head_that_does_not_turn_has_no_mismatch_of_its_rotation():
+    still = np.zeros((100, 3))
+    given = Recording(Signal(A, "g", 1e3), Signal(still, "rad/s", 1e3), Signal(still, "rad/s^2", 1e3))
+    assert notes(given, "angular_acceleration_mismatch") == []
+
+
+def test_an_angular_acceleration_in_degrees_keeps_its_shape_and_is_caught_by_the_unit_check():
+    own = np.rad2deg(differentiate(recording().angular_velocity.values, 1000.0))
+    given = replace(recording(), angular_acceleration=Signal(own, "rad/s^2", 1e3))
+    assert notes(given, "angular_acceleration_mismatch") == []
+    assert len(notes(given, "implausible_units")) == 1
+
+
+def test_every_note_has_a_code_a_severity_and_a_sentence():
+    x = A.copy()
+    x[:, 2] = 0.0
+    x[30:40, 0] = 300.0
+    found = score(prepare(Recording(Signal(x, "g", 700.0), Signal(W[:100], "rad/s", 700.0)))).quality
+    assert {"constant_channel", "saturated", "extreme_value", "low_sample_rate"} <= {note.code for note in found}
+    for note in found:
+        assert note.code.replace("_", "").isalpha()
+        assert note.code.islower()
+        assert note.severity in ("note", "warning")
+        assert note.detail[0].isupper()
+        assert note.detail.endswith(".")
+
+
+def test_notes_of_preparation_and_of_scoring_come_together():
+    prepared = prepare(linear(A[:50]))
+    assert isinstance(prepared, Preparation)
+    assert [note.code for note in score(prepared).quality][-1] == "record_truncated"
