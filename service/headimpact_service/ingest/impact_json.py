@@ -19,10 +19,12 @@ MAX_OPERATING_POINTS = 20
 # No control characters: they have no place in a name, and PostgreSQL stores no NUL.
 PRINTABLE = r"^[^\u0000-\u001f\u007f]+$"
 
-Name = Annotated[str, Field(min_length=1, max_length=200, pattern=PRINTABLE)]
+MAX_NAME = 200
+Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME, pattern=PRINTABLE)]
 Text = Annotated[str, Field(min_length=1, max_length=2000, pattern=PRINTABLE)]
 Word = Annotated[str, Field(min_length=1, max_length=64, pattern=PRINTABLE)]
-Samples = Annotated[list[float], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES)]
+# The first bad sample ends a list's validation: a list of 20 000 strings would cost a megabyte of errors a thousand.
+Samples = Annotated[list[float], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES, fail_fast=True)]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]

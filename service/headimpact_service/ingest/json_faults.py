@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from math import isfinite
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -11,6 +13,9 @@ from pydantic_core import ErrorDetails, from_json
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 
 Body = TypeVar("Body", bound=BaseModel)
+
+MAX_MEMBERS = 5000
+"""Of one body: an impact has about sixty. Every unknown one costs a kilobyte of error."""
 
 MAX_POINTER = 200
 """Characters of a pointer that is given back: keys in it come from the caller."""
@@ -44,10 +49,14 @@ _RULES: Mapping[str, tuple[str, str]] = {
     "filter_form": ("wrong-type", 'A filter is "paper", "none" or an object with a cut-off for each signal.'),
 }
 _SAMPLES = frozenset({"x", "y", "z", "time_ms"})
+_OF_SAMPLES = frozenset({"float_type", "finite_number"})
 
 
 def parse(data: bytes, model: type[Body], *, what: str = "body") -> Body:
     """`data` as `model`: 400 unless it is JSON, 422 with every broken rule (up to 20) unless it fits."""
+    # Every member has its colon, so that none needs to be parsed to bound their number.
+    if data.count(b":") > MAX_MEMBERS:
+        raise too_many_members(what)
     try:
         return model.model_validate_json(data)
     except ValidationError as error:
@@ -62,16 +71,35 @@ def validation_problem(error: ValidationError, data: bytes, *, what: str = "body
     return rules_problem(payload_errors(faults, from_json(data)), what=what, count=len(faults))
 
 
-def rules_problem(errors: Sequence[PayloadError], *, what: str = "body", count: int | None = None) -> Problem:
+def too_many_members(what: str) -> Problem:
+    """The 400 for so many members, or ones so deeply nested, that naming what is wrong would be the attack."""
+    return Problem("malformed-request", f"The {what} has more than {MAX_MEMBERS} members, which no request needs.")
+
+
+def members(document: Any) -> int:  # noqa: ANN401 - any JSON
+    """How many members a parsed object and the objects inside it have."""
+    if not isinstance(document, dict):
+        return 0
+    return len(document) + sum(members(value) for value in document.values())
+
+
+def rules_problem(errors: Sequence[PayloadError], *, what: str = "body", count: int = 0) -> Problem:
     """The 422 for rules that a readable body breaks."""
-    number = count or len(errors)
+    number = max(count, len(errors))
     broken = "a rule" if number == 1 else f"{number} rules"
     return Problem("invalid-payload", f"The {what} breaks {broken}.", errors=errors)
 
 
 def payload_errors(faults: Sequence[ErrorDetails], document: Any) -> list[PayloadError]:  # noqa: ANN401 - any JSON
     """The first 20 faults, each at the pointer where `document` has it."""
-    return [_payload_error(fault, document) for fault in faults[:MAX_ERRORS]]
+    errors: list[PayloadError] = []
+    for fault in faults:
+        if len(errors) >= MAX_ERRORS:
+            break
+        errors.append(_payload_error(fault, document))
+        if fault["type"] in _OF_SAMPLES:
+            errors += islice(_later_samples(_steps(fault, document), document), MAX_ERRORS - len(errors))
+    return errors
 
 
 def pointer(steps: Sequence[object]) -> str:
@@ -87,6 +115,29 @@ def _payload_error(fault: ErrorDetails, document: Any) -> PayloadError:  # noqa:
     if code in {"too-short", "too-long"} and steps and steps[-1] in _SAMPLES:
         detail = detail.replace("entries", "samples")
     return PayloadError(detail=detail, code=code, pointer=pointer(steps))
+
+
+def _later_samples(steps: list[object], document: Any) -> Iterator[PayloadError]:  # noqa: ANN401 - any JSON
+    """The other bad samples of a list, of which validation tells the first only."""
+    if len(steps) < 2 or steps[-2] not in _SAMPLES or not isinstance(steps[-1], int):
+        return
+    samples = document
+    for step in steps[:-1]:
+        samples = samples[step]
+    for index in range(steps[-1] + 1, len(samples)):
+        kind = _fault_of_sample(samples[index])
+        if kind is not None:
+            code, sentence = _RULES[kind]
+            yield PayloadError(detail=sentence, code=code, pointer=pointer([*steps[:-1], index]))
+
+
+def _fault_of_sample(value: object) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return "float_type"
+    try:
+        return None if isfinite(value) else "finite_number"
+    except OverflowError:
+        return "finite_number"
 
 
 def _steps(fault: ErrorDetails, document: Any) -> list[object]:  # noqa: ANN401 - any JSON

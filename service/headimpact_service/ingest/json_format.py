@@ -10,12 +10,12 @@ from pydantic import ValidationError
 from pydantic_core import from_json
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.impact_json import FileImpactBody
+from headimpact_service.ingest.impact_json import MAX_NAME, FileImpactBody
 from headimpact_service.ingest.impact_reading import to_record
-from headimpact_service.ingest.json_faults import payload_errors, rules_problem
+from headimpact_service.ingest.json_faults import MAX_MEMBERS, members, payload_errors, rules_problem, too_many_members
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
-from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 
 _LISTS = ("data", "impacts")
 
@@ -27,17 +27,25 @@ def read_json(data: bytes, options: ImportOptions) -> Iterator[ImpactRecord | Pr
         try:
             yield read_item(item, options)
         except Problem as problem:
-            yield problem
+            yield RefusedImpact(problem, sent_name(item))
 
 
 def read_item(item: Any, options: ImportOptions) -> ImpactRecord:  # noqa: ANN401 - any JSON
     """One impact of a parsed file, under the same rules as a body."""
+    if members(item) > MAX_MEMBERS:
+        raise Problem("unreadable-file", too_many_members("impact").detail)
     try:
         body = FileImpactBody.model_validate(item)
     except ValidationError as error:
         faults = error.errors(include_url=False, include_input=False)
         raise rules_problem(payload_errors(faults, item), what="impact", count=len(faults)) from None
     return with_options(to_record(body, time_zone=options.time_zone, what="impact"), options)
+
+
+def sent_name(item: Any) -> str | None:  # noqa: ANN401 - any JSON
+    """What the sender calls an impact that is refused, if that much of it can be told."""
+    name = item.get("external_id") if isinstance(item, dict) else None
+    return name if isinstance(name, str) and len(name) <= MAX_NAME else None
 
 
 def refuse_table_options(options: ImportOptions, kind: str) -> None:

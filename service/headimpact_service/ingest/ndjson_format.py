@@ -5,14 +5,16 @@ from __future__ import annotations
 import codecs
 from collections.abc import Iterator
 
+from pydantic_core import from_json
+
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.impact_json import FileImpactBody
 from headimpact_service.ingest.impact_reading import to_record
-from headimpact_service.ingest.json_faults import parse
-from headimpact_service.ingest.json_format import refuse_table_options
+from headimpact_service.ingest.json_faults import MAX_MEMBERS, parse
+from headimpact_service.ingest.json_format import refuse_table_options, sent_name
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
-from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 
 MAX_LINE = 8 * 1024 * 1024
 """As a JSON body: a line holds one impact."""
@@ -29,7 +31,7 @@ def read_ndjson(data: bytes, options: ImportOptions) -> Iterator[ImpactRecord | 
         try:
             yield _read_line(line, number, options)
         except Problem as problem:
-            yield problem
+            yield RefusedImpact(problem, _sent_name(line))
     if count == 0:
         raise Problem("unreadable-file", "The file holds no impact.")
 
@@ -45,6 +47,15 @@ def _read_line(line: bytes, number: int, options: ImportOptions) -> ImpactRecord
             raise Problem("unreadable-file", problem.detail) from None
         raise
     return with_options(to_record(body, time_zone=options.time_zone, what=what), options)
+
+
+def _sent_name(line: bytes) -> str | None:
+    if len(line) > MAX_LINE or line.count(b":") > MAX_MEMBERS:
+        return None
+    try:
+        return sent_name(from_json(line))
+    except ValueError:
+        return None
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:

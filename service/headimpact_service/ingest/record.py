@@ -10,6 +10,7 @@ from typing import Any
 from headimpact.quality import QualityNote
 from headimpact.recording import Recording
 from headimpact.risk import OperatingPointRequest
+from headimpact_service.errors import Problem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,3 +59,14 @@ class ImpactRecord:
     operating_points: tuple[OperatingPointRequest, ...] | None = None
     include: tuple[str, ...] = ()
     extra_criteria: tuple[str, ...] = ()
+
+
+class RefusedImpact(Problem):
+    """The problem of one impact of a file, with the sender's name for it where that could be read."""
+
+    def __init__(self, problem: Problem, external_id: str | None) -> None:
+        """The same problem as `problem`."""
+        super().__init__(
+            problem.slug, problem.detail, errors=problem.errors, headers=problem.headers, extra=problem.extra
+        )
+        self.external_id = external_id

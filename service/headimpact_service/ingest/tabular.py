@@ -16,19 +16,18 @@ from headimpact.quality import QualityNote
 from headimpact.recording import AxesName, Recording, Signal, SignalName
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.headings import Headings
-from headimpact_service.ingest.impact_json import MAX_SAMPLES, PRINTABLE
+from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES, PRINTABLE
 from headimpact_service.ingest.impact_reading import low_pass, mounting
 from headimpact_service.ingest.layout import Layout, SignalLayout, lay_out
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import Preset, preset_named, recognise
-from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.stamps import nominal_rate
 from headimpact_service.ingest.table import Columns, FloatArray, Table
 from headimpact_service.ingest.times import TimeError, instant
 
 MAX_ROWS = 20_000_000
-MAX_NAME = 200
 _PRINTABLE = re.compile(PRINTABLE)
 
 Rows = slice | list[int]
@@ -66,10 +65,11 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
         raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
     samples = _Samples(layout, columns)
     for rows in impacts:
+        impact = _Impact(plan, samples, rows)
         try:
-            yield _Impact(plan, samples, rows).record()
+            yield impact.record()
         except Problem as problem:
-            yield problem
+            yield RefusedImpact(problem, impact.sent_name())
 
 
 def _plan(headings: Headings, options: ImportOptions, format_name: str) -> Plan:
@@ -192,6 +192,13 @@ class _Impact:
             notes=tuple(self.notes),
             needs_device_mounting=sensor and self.mapping.mounting is None,
         )
+
+    def sent_name(self) -> str | None:
+        """What the file calls the impact."""
+        try:
+            return self._name("external_id", self.layout.external_id)
+        except Problem:
+            return None
 
     def _drop(self) -> None:
         """Leave out the samples that the layout calls corrupt, and say so."""

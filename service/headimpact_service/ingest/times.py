@@ -77,13 +77,9 @@ def _zone(name: str) -> ZoneInfo:
 def _placed(local: datetime, zone: ZoneInfo) -> datetime:
     """`local` on that zone's clock, refused where the clock was put forward or back over it."""
     early, late = local.replace(tzinfo=zone, fold=0), local.replace(tzinfo=zone, fold=1)
-    try:
-        if early.utcoffset() == late.utcoffset():
-            return early
-        shown = early.astimezone(UTC).astimezone(zone).replace(tzinfo=None) == local
-    except OverflowError:
-        raise TimeError("A time lies between the years 1 and 9999 in UTC.", code="out-of-range") from None
-    if shown:
+    if early.utcoffset() == late.utcoffset():
+        return early
+    if early.astimezone(UTC).astimezone(zone).replace(tzinfo=None) == local:
         raise TimeError(
             "This local time happened twice, as clocks were put back: give its offset.", code="ambiguous-time"
         )

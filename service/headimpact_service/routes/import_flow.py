@@ -12,7 +12,7 @@ from anyio.to_thread import run_sync
 from headimpact_service import deps
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.digest import content_digest
-from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.intake.records import describe, kinematics_document
 from headimpact_service.intake.rendering import new_score, score_document
 from headimpact_service.intake.scoring import DeviceFacts, Scored, digest_bytes, score_records
@@ -55,7 +55,7 @@ def _score_all(call: Call, found: Sequence[ImpactRecord | Problem], known: Known
     items = []
     for record in found:
         if isinstance(record, Problem):
-            items.append(Item(None, record))
+            items.append(Item(record.external_id if isinstance(record, RefusedImpact) else None, record))
         else:
             items.append(Item(record.external_id, next(scored), digest_bytes(content_digest(record))))
     return items

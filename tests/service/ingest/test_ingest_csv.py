@@ -10,7 +10,7 @@ from ingest_files import GENERIC, codes, csv_text, one, outcome, read, refused, 
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest import csv_format
-from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 
 
 def samples_of(record: ImpactRecord) -> np.ndarray:
@@ -98,6 +98,8 @@ def test_a_bad_cell_is_the_fault_of_its_own_impact(cell: str):
     assert isinstance(good, ImpactRecord)
     assert isinstance(last, ImpactRecord)
     assert isinstance(bad, Problem)
+    assert isinstance(bad, RefusedImpact)
+    assert bad.external_id == "b"
     assert (bad.slug, bad.errors[0].code) == ("unreadable-file", "missing-sample")
     assert "column 4" in bad.detail
     assert "sample 4" in bad.detail

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from datetime import UTC, datetime
 from typing import Any, get_args
 
@@ -95,7 +96,8 @@ def test_an_impact_needs_its_athlete_by_exactly_one_id():
         (b"{'a': 1}", "key must be a string"),
         (b'{"a": 1,}', "trailing comma"),
         (b"[" * 100_000, "recursion limit"),
-        (b'{"a":' * 100_000, "recursion limit"),
+        (b'{"a":' * 4000, "recursion limit"),
+        (b'{"a":' * 100_000, "more than 5000 members"),
         (b'{"external_id": "\\ud800"}', "hex escape"),
         (b'{"external_id": "\xed\xa0\x80"}', "invalid unicode"),
         (b'{"external_id": "\xff"}', "invalid unicode"),
@@ -233,6 +235,30 @@ def test_at_most_twenty_errors_are_listed_and_none_holds_the_value():
     assert "secret-value" not in json.dumps(problem.as_dict())
 
 
+def test_every_bad_sample_of_a_list_is_named():
+    samples: list[Any] = [0.0] * 40
+    samples[3:8] = ["1", True, None, float("nan"), 10**400]
+    wrong = ["wrong-type", "wrong-type", "wrong-type", "not-finite", "not-finite"]
+    expected = [(f"/kinematics/linear_acceleration/y/{3 + i}", code) for i, code in enumerate(wrong)]
+    assert faults_of(with_acceleration(y=samples)) == expected
+
+
+def peak_of_refusing(document: bytes) -> int:
+    tracemalloc.start()
+    problem = problem_of(document)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert problem.status in {400, 422}
+    return peak
+
+
+def test_a_body_of_nothing_but_faults_costs_little():
+    keys = ("{" + ",".join(f'"a{i}":1' for i in range(500_000)) + "}").encode()
+    assert peak_of_refusing(keys) < 100_000
+    wrong = ["1"] * 20_000
+    assert peak_of_refusing(encoded(with_acceleration(x=wrong, y=wrong, z=wrong))) < 5_000_000
+
+
 def test_at_least_one_signal_is_needed():
     document = with_kinematics(linear_acceleration=None, angular_velocity=None)
     assert faults_of(document) == [("/kinematics", "no-signal")]
@@ -264,6 +290,9 @@ def test_components_outside_a_constrained_plane_may_be_absent_and_become_zero(pl
 
 def test_a_component_inside_the_plane_is_needed_and_every_one_without_a_plane():
     assert faults_of(with_acceleration(y="absent")) == [("/kinematics/linear_acceleration/y", "missing")]
+    assert faults_of(with_acceleration(x=None, y=None, z=None)) == [
+        (f"/kinematics/linear_acceleration/{axis}", "missing") for axis in "xyz"
+    ]
     assert faults_of(with_acceleration(y=None)) == [("/kinematics/linear_acceleration/y", "missing")]
     document = with_acceleration(x=None)
     document["kinematics"]["constrained_plane"] = "sagittal"

@@ -17,7 +17,15 @@ from headimpact_service.ingest import ndjson_format
 from headimpact_service.ingest.digest import content_digest
 from headimpact_service.ingest.impact_reading import read_impact
 from headimpact_service.ingest.mapping import Mapping
-from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
+
+
+@pytest.mark.parametrize("name", [7, "x" * 201, ["a"]])
+def test_a_name_that_is_none_is_not_given_back(name: Any):
+    for data in (json.dumps([body(), body(external_id=name)]).encode(), lines(body(), body(external_id=name))):
+        refusal = read(data)[1]
+        assert isinstance(refusal, RefusedImpact)
+        assert refusal.external_id is None
 
 
 def ids(items: list[ImpactRecord | Problem]) -> list[str | None]:
@@ -48,6 +56,8 @@ def test_a_bad_impact_of_a_list_is_its_own_problem():
     assert ids([first, second, third, last]) == ["a", "invalid-payload", "invalid-payload", "d"]
     assert isinstance(second, Problem)
     assert codes(second) == [("/kinematics/angular_velocity/unit", "not-allowed")]
+    assert isinstance(second, RefusedImpact)
+    assert second.external_id == "b"
     assert isinstance(third, Problem)
     assert codes(third) == [("", "wrong-type")]
 
@@ -77,6 +87,16 @@ def test_a_file_that_is_not_json_or_empty_is_refused(data: bytes, said: str):
     assert said in problem.detail
 
 
+def test_an_impact_of_thousands_of_members_is_refused():
+    crowded = body(external_id="b", context={f"k{i}": 1 for i in range(6000)})
+    for data in (json.dumps([body(), crowded]).encode(), lines(body(), crowded)):
+        good, bad = read(data)
+        assert isinstance(good, ImpactRecord)
+        assert isinstance(bad, Problem)
+        assert bad.slug == "unreadable-file"
+        assert "5000 members" in bad.detail
+
+
 def test_ndjson_is_an_impact_a_line_and_empty_lines_are_passed_over():
     data = b"\xef\xbb\xbf" + lines(body(external_id="a"), b"", b"  ", body(external_id="b")) + b"\r\n"
     assert ids(read(data)) == ["a", "b"]
@@ -90,6 +110,7 @@ def test_a_bad_line_is_that_lines_problem():
     assert "line 2" in items[1].detail
     assert isinstance(items[2], Problem)
     assert codes(items[2]) == [("/colour", "unknown-field")]
+    assert [item.external_id for item in items if isinstance(item, RefusedImpact)] == [None, "c"]
 
 
 def test_one_line_is_ndjson_by_name_or_type():

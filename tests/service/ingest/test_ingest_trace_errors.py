@@ -1,0 +1,70 @@
+"""What the science refuses, as the answer that a caller gets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from ingest_files import body, codes, encoded, kinematics, signal, six_axis
+
+from headimpact.errors import TraceError
+from headimpact.preparation import prepare
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.impact_reading import read_impact
+from headimpact_service.ingest.trace_errors import trace_problem
+
+STEADY = [float(i) for i in range(40)]
+
+
+def refusal(**changes: Any) -> Problem:
+    record = read_impact(encoded(body(kinematics=kinematics(six_axis(), **changes))))
+    with pytest.raises(TraceError) as caught:
+        prepare(record.recording)
+    return trace_problem(caught.value)
+
+
+def stamped(stamps: list[float]) -> dict[str, Any]:
+    return {"angular_velocity": signal("rad/s", six_axis()[:, 3:], time_ms=stamps)}
+
+
+@pytest.mark.parametrize(
+    ("stamps", "fault"),
+    [
+        ([*STEADY[:20], *STEADY[19:39]], ("/kinematics/angular_velocity/time_ms/20", "time-not-increasing")),
+        (STEADY[::-1], ("/kinematics/angular_velocity/time_ms/1", "time-not-increasing")),
+        ([0.0, 0.5, *STEADY[2:]], ("/kinematics/angular_velocity/time_ms/1", "time-jitter")),
+        ([10.0 * stamp for stamp in STEADY], ("/kinematics/angular_velocity", "sample-rate")),
+        ([1e-300 * stamp for stamp in STEADY], ("/kinematics/angular_velocity", "sample-rate")),
+    ],
+)
+def test_stamps_that_cannot_be_used_are_pointed_at(stamps: list[float], fault: tuple[str, str]):
+    problem = refusal(**stamped(stamps))
+    assert (problem.slug, problem.status) == ("invalid-trace", 422)
+    assert codes(problem) == [fault]
+
+
+def test_a_sample_out_of_range_is_pointed_at_and_its_bound_named_but_not_its_value():
+    samples = six_axis()
+    samples[7, 1] = 12345.0
+    problem = refusal(linear_acceleration=signal("g", samples[:, :3]))
+    assert codes(problem) == [("/kinematics/linear_acceleration/y/7", "value-out-of-range")]
+    assert "1000 g" in problem.detail
+    assert "12345" not in problem.detail
+
+
+def test_a_record_in_which_nothing_moves_is_refused_as_a_whole():
+    still = signal("g", np.ones((40, 3)))
+    problem = refusal(linear_acceleration=still, angular_velocity=None)
+    assert codes(problem) == [("/kinematics", "constant-signal")]
+
+
+def test_a_channel_without_a_sample_is_pointed_at():
+    error = TraceError("channel", "A channel.", signal="angular_velocity", channel="z")
+    assert codes(trace_problem(error)) == [("/kinematics/angular_velocity/z", "channel")]
+
+
+def test_an_improper_rotation_has_its_own_problem():
+    problem = trace_problem(TraceError("improper-rotation", "The rotation."))
+    assert problem.slug == "improper-rotation"
+    assert codes(problem) == [("/kinematics/mounting", "improper-rotation")]
