@@ -108,7 +108,7 @@ def _note(node: ast.AST, constants: dict[str, str]) -> Iterator[tuple[str, str]]
     match node:
         case ast.Call(func=ast.Name("QualityNote"), args=[ast.Constant(str(code)), ast.Constant(str(severity)), *_]):
             yield code, severity
-        case ast.Call(func=ast.Attribute(attr="_note"), args=[ast.Constant(str(code)), *_]):
+        case ast.Call(func=ast.Name("_warning") | ast.Attribute(attr="_note"), args=[ast.Constant(str(code)), *_]):
             yield code, "warning"
         case ast.Dict(
             [ast.Constant("code"), ast.Constant("severity"), *_], [ast.Name(code), ast.Constant(str(word)), *_]
