@@ -82,7 +82,7 @@ NOMENCLATURE = "docs/nomenclature.md"
 def test_every_quality_code_of_the_code_has_a_meaning_and_a_remedy_and_no_other_has() -> None:
     listed = table("docs/quality.md", "# Quality notes")
     documented = {
-        (code, word) for code, severity, *_ in listed for word in severity.split(", ") for code in spans(code)
+        (code, word) for cell, severity, *_ in listed for word in severity.split(", ") for code in spans(cell)
     }
     assert documented == set(quality_notes())
     assert all(meaning and remedy for *_, meaning, remedy in listed)
