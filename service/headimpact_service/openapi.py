@@ -167,13 +167,16 @@ def _success(answer: Answer, references: References) -> dict[str, Any]:
         }
     content: dict[str, Any] = {}
     for media_type in answer.media_types:
-        structured = media_type == JSON and answer.model is not None
-        content[media_type] = {
-            "schema": references[answer.model, "serialization"] if structured and answer.model else {"type": "string"}
-        }
+        content[media_type] = {"schema": _answer_schema(answer, media_type, references)}
     if content:
         described["content"] = content
     return described
+
+
+def _answer_schema(answer: Answer, media_type: str, references: References) -> dict[str, Any]:
+    if media_type != JSON:
+        return {"type": "string"}
+    return {"type": "object"} if answer.model is None else references[answer.model, "serialization"]
 
 
 def _slugs(operation: Operation) -> list[str]:

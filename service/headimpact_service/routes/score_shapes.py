@@ -64,6 +64,12 @@ class CriterionView(Shape):
     reason: str | None = None
 
 
+class ExtraCriterionView(CriterionView):
+    """A criterion beside the thirteen; `risks` are its own published curves, by name."""
+
+    risks: dict[str, Probability] | None = None
+
+
 _FIELDS: dict[str, Any] = {criterion.key: (CriterionView, ...) for criterion in CRITERIA}
 CriteriaView = create_model(
     "CriteriaView", __base__=Shape, __doc__="The thirteen criteria, in the paper's order.", **_FIELDS
@@ -83,6 +89,15 @@ class OperatingPointView(Shape):
     basis: Literal["published", "interpolated", "cohort", "requested"]
 
 
+class FilterView(Shape):
+    """The low-pass filter of one signal; `corner_hz` is null where the rate could not carry it."""
+
+    signal: str
+    cut_off: float | str
+    corner_hz: float | None
+    applied: bool
+
+
 class ProvenanceView(Shape):
     """What the score was made from and with; enough to make it again."""
 
@@ -90,8 +105,10 @@ class ProvenanceView(Shape):
     service_version: str
     model: str
     incidence: float
-    filters: list[dict[str, Any]]
+    filters: list[FilterView]
     conventions: dict[str, str]
+    angular_velocity_source: str | None = Field(None, description="`supplied`, or what it was derived by.")
+    angular_acceleration_source: str | None = Field(None, description="`supplied`, or what it was derived by.")
 
 
 class TraceView(Shape):
@@ -124,7 +141,7 @@ class ScoreView(Shape):
     brain_angle: BrainAngleView | None
     peaks: PeaksView
     criteria: CriteriaView  # type: ignore[valid-type] # its fields are the registry's
-    extra_criteria: dict[str, CriterionView] | None = Field(None, description="Those asked for by name.")
+    extra_criteria: dict[str, ExtraCriterionView] | None = Field(None, description="Those asked for by name.")
     operating_points: list[OperatingPointView]
     provenance: ProvenanceView
     traces: ScoredTracesView | None = Field(None, description='Only where `include` asked for "traces".')
