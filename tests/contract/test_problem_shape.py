@@ -50,12 +50,26 @@ def corrected(api: Api, headers: dict[str, str]) -> httpx.Response:
 # (problem, what is done, how it fails)
 WAYS: list[tuple[str, str, Way]] = [
     ("malformed-request", "not JSON", lambda api: api.post("/v1/score", content=SECRET.encode(), headers=JSON)),
-    ("malformed-request", "no gzip", lambda api: api.post("/v1/score", content=SECRET, headers=JSON | {"Content-Encoding": "gzip"})),
-    ("malformed-request", "no multipart", lambda api: api.post("/v1/imports", content=SECRET, headers={"Content-Type": "multipart/form-data; boundary=b"})),
+    (
+        "malformed-request",
+        "no gzip",
+        lambda api: api.post("/v1/score", content=SECRET, headers=JSON | {"Content-Encoding": "gzip"}),
+    ),
+    (
+        "malformed-request",
+        "no multipart",
+        lambda api: api.post(
+            "/v1/imports", content=SECRET, headers={"Content-Type": "multipart/form-data; boundary=b"}
+        ),
+    ),
     ("bad-cursor", "a cursor of nobody", lambda api: api.get(f"/v1/impacts?cursor={SECRET}")),
     ("unauthenticated", "no key", lambda api: api.get("/v1/me", key=None)),
     ("unauthenticated", "an unknown key", lambda api: api.get("/v1/me", key=SECRET)),
-    ("insufficient-scope", "a key for scores only", lambda api: api.get("/v1/keys", key=api.post("/v1/keys", json={"scopes": ["score"]}).json()["key"])),
+    (
+        "insufficient-scope",
+        "a key for scores only",
+        lambda api: api.get("/v1/keys", key=api.post("/v1/keys", json={"scopes": ["score"]}).json()["key"]),
+    ),
     ("not-found", "an unknown path", lambda api: api.get(f"/{SECRET}")),
     ("not-found", "an unknown path below /v1", lambda api: api.get(f"/v1/{SECRET}")),
     ("not-found", "a trailing slash", lambda api: api.get("/v1/impacts/")),
@@ -70,24 +84,86 @@ WAYS: list[tuple[str, str, Way]] = [
     ("impact-deleted", "after its deletion", deleted),
     ("precondition-failed", "a stale ETag", lambda api: corrected(api, {"If-Match": '"7"'})),
     ("precondition-required", "no ETag", lambda api: corrected(api, {})),
-    ("body-too-large", "over 8 MiB", lambda api: api.post("/v1/score", content=b" " * (8 * 1024 * 1024 + 1), headers=JSON)),
-    ("body-too-large", "over 8 MiB inflated", lambda api: api.post("/v1/score", content=zipped(b" " * (8 * 1024 * 1024 + 1)), headers=JSON | {"Content-Encoding": "gzip"})),
-    ("import-too-large", "1001 impacts", lambda api: api.post("/v1/imports", content=b"{}\n" * 1001, headers={"Content-Type": "application/x-ndjson"})),
-    ("unsupported-media-type", "text", lambda api: api.post("/v1/score", content=SECRET, headers={"Content-Type": "text/plain"})),
-    ("unsupported-media-type", "HDF5", lambda api: api.post("/v1/imports", content=b"\x89HDF\r\n\x1a\n" + bytes(64), headers={"Content-Type": "application/octet-stream"})),
+    (
+        "body-too-large",
+        "over 8 MiB",
+        lambda api: api.post("/v1/score", content=b" " * (8 * 1024 * 1024 + 1), headers=JSON),
+    ),
+    (
+        "body-too-large",
+        "over 8 MiB inflated",
+        lambda api: api.post(
+            "/v1/score", content=zipped(b" " * (8 * 1024 * 1024 + 1)), headers=JSON | {"Content-Encoding": "gzip"}
+        ),
+    ),
+    (
+        "import-too-large",
+        "1001 impacts",
+        lambda api: api.post("/v1/imports", content=b"{}\n" * 1001, headers={"Content-Type": "application/x-ndjson"}),
+    ),
+    (
+        "unsupported-media-type",
+        "text",
+        lambda api: api.post("/v1/score", content=SECRET, headers={"Content-Type": "text/plain"}),
+    ),
+    (
+        "unsupported-media-type",
+        "HDF5",
+        lambda api: api.post(
+            "/v1/imports",
+            content=b"\x89HDF\r\n\x1a\n" + bytes(64),
+            headers={"Content-Type": "application/octet-stream"},
+        ),
+    ),
     ("invalid-payload", "a list", lambda api: api.post("/v1/score", json=[SECRET])),
-    ("invalid-payload", "an unknown unit", lambda api: api.post("/v1/impacts", json=changed(impact_body(), "/kinematics/linear_acceleration/unit", SECRET))),
-    ("invalid-payload", "an unknown athlete", lambda api: api.post("/v1/impacts", json=impact_body(athlete={"id": SECRET}))),
-    ("invalid-payload", "an unknown model", lambda api: api.post(f"/v1/impacts/{api.create()['id']}/scores", json={"model": SECRET})),
+    (
+        "invalid-payload",
+        "an unknown unit",
+        lambda api: api.post(
+            "/v1/impacts", json=changed(impact_body(), "/kinematics/linear_acceleration/unit", SECRET)
+        ),
+    ),
+    (
+        "invalid-payload",
+        "an unknown athlete",
+        lambda api: api.post("/v1/impacts", json=impact_body(athlete={"id": SECRET})),
+    ),
+    (
+        "invalid-payload",
+        "an unknown model",
+        lambda api: api.post(f"/v1/impacts/{api.create()['id']}/scores", json={"model": SECRET}),
+    ),
     ("invalid-parameter", "a bad limit", lambda api: api.get(f"/v1/impacts?limit={SECRET}")),
     ("invalid-parameter", "a bad If-Match", lambda api: corrected(api, {"If-Match": SECRET})),
-    ("invalid-parameter", "a bad field", lambda api: api.post(f"/v1/imports?axes={SECRET}", content=b"a,b", headers={"Content-Type": "text/csv"})),
+    (
+        "invalid-parameter",
+        "a bad field",
+        lambda api: api.post(f"/v1/imports?axes={SECRET}", content=b"a,b", headers={"Content-Type": "text/csv"}),
+    ),
     ("invalid-trace", "nothing moves", lambda api: api.post("/v1/impacts", json=impact_body(scale=0.0))),
-    ("improper-rotation", "a mirror", lambda api: api.post("/v1/impacts", json=impact_body(kinematics=kinematics(location="sensor", mounting=MOUNTING)))),
-    ("mounting-missing", "an unknown device", lambda api: api.post("/v1/impacts", json=impact_body(kinematics=kinematics(location="sensor")))),
-    ("operating-point-unreachable", "99 %", lambda api: api.patch("/v1/settings", json={"operating_points": [{"criterion": "bam", "sensitivity": 0.99}]})),
-    ("unreadable-file", "columns of nobody", lambda api: api.post("/v1/imports", content=f"{SECRET},b\n1,2\n", headers={"Content-Type": "text/csv"})),
-]  # fmt: skip
+    (
+        "improper-rotation",
+        "a mirror",
+        lambda api: api.post(
+            "/v1/impacts", json=impact_body(kinematics=kinematics(location="sensor", mounting=MOUNTING))
+        ),
+    ),
+    (
+        "mounting-missing",
+        "an unknown device",
+        lambda api: api.post("/v1/impacts", json=impact_body(kinematics=kinematics(location="sensor"))),
+    ),
+    (
+        "operating-point-unreachable",
+        "99 %",
+        lambda api: api.patch("/v1/settings", json={"operating_points": [{"criterion": "bam", "sensitivity": 0.99}]}),
+    ),
+    (
+        "unreadable-file",
+        "columns of nobody",
+        lambda api: api.post("/v1/imports", content=f"{SECRET},b\n1,2\n", headers={"Content-Type": "text/csv"}),
+    ),
+]
 
 ELSEWHERE = {"request-timeout", "too-many-requests", "internal-error", "unavailable"}
 """Below: these need an application or a client of their own."""
@@ -197,7 +273,7 @@ class TestLimits:
                 if not begun:
                     begun.append(True)
                     return {"type": "http.request", "body": b'{"kinematics"', "more_body": True}
-                await asyncio.Event().wait()
+                return await asyncio.Event().wait()
 
             async def send(message: Any) -> None:
                 sent.append(message)
