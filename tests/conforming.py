@@ -32,10 +32,12 @@ def _registry() -> Registry[Any]:
 def _paths() -> list[tuple[re.Pattern[str], str]]:
     """Paths as patterns; the more specific first."""
     paths = sorted(document()["paths"], key=lambda path: (path.count("{"), -len(path)))
-    return [
-        (re.compile(re.sub(r"{serial}", ".+", path).replace("{", "(?P<").replace("}", ">[^/]+)")), path)
-        for path in paths
-    ]
+    return [(re.compile(_pattern(path)), path) for path in paths]
+
+
+def _pattern(path: str) -> str:
+    """A serial may hold slashes, an identifier may not."""
+    return re.sub(r"{\w+}", "[^/]+", path.replace("{serial}", ".+"))
 
 
 @cache

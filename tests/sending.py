@@ -125,4 +125,4 @@ class Api:
 
 def zipped(body: Any) -> bytes:
     """A body as gzip."""
-    return gzip.compress(body if isinstance(body, bytes) else json.dumps(body).encode())
+    return gzip.compress(body if isinstance(body, bytes) else json.dumps(body).encode(), mtime=0)
