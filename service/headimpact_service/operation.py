@@ -50,8 +50,6 @@ class BodyForm:
 
     media_type: str
     model: type[BaseModel] | None
-    example: str | None = None
-    """Name of the file in openapi/examples that shows it."""
 
 
 @dataclass(frozen=True, slots=True)
