@@ -142,7 +142,7 @@ def test_windows_may_be_as_long_as_the_limit(limit_ms):
     assert float(value) == pytest.approx(50.0**2.5 * limit_ms / 1000, rel=1e-12)
 
 
-def test_with_a_strict_limit_hic15_would_read_up_to_several_percent_lower_at_1_khz():
+def test_with_a_strict_limit_a_square_pulses_hic15_would_read_7_percent_lower_at_1_khz():
     # what misprint 2 costs: a square pulse longer than the limit loses one interval of fifteen
     x = np.full(100, 50.0)
     inclusive, strict = (float(window_maxima(x, 1000.0, (limit,))[0][0]) for limit in (0.015, 0.014))
