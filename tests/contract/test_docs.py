@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from documents import PAGES, ROOT, anchors, blocks, links, prose, section, spans, table, text, tracked
+from sending import Api
 
 from headimpact.criteria import CRITERIA
 from headimpact.criteria.extra import EXTRA_CRITERIA
@@ -58,6 +61,41 @@ def test_the_readme_states_the_limits(words: str) -> None:
 def test_ci_runs_the_readmes_test_command_as_it_is_written() -> None:
     assert "pip install uv && uv run pytest" in text(".ci/run")
     assert (ROOT / ".ci/run").stat().st_mode & 0o111
+
+
+def test_the_readmes_call_sends_an_example_to_an_operation() -> None:
+    (path,) = re.findall(r"http://127\.0\.0\.1:8000(\S+)", CALL)
+    assert ("POST", path) in {(operation.method, operation.path) for operation in OPERATIONS}
+
+
+def test_the_readmes_answer_is_the_one_that_the_service_gives(api: Api) -> None:
+    (example,) = re.findall(r"--data @(\S+)", CALL)
+    answer = api.post("/v1/score", json=json.loads(text(example))).json()
+    assert_shortens(ANSWER, answer)
+
+
+def assert_shortens(shown: Any, whole: Any) -> None:
+    """`shown` is `whole` with some members left out, which an ellipsis says, and numbers of six digits."""
+    match shown:
+        case dict():
+            assert (shown.keys() == whole.keys()) != ("…" in shown)
+            for key in shown.keys() - {"…"}:
+                assert_shortens(shown[key], whole[key])
+        case [*_, "…"]:
+            for part, other in zip(shown[:-1], whole, strict=False):
+                assert_shortens(part, other)
+        case list():
+            assert len(shown) == len(whole)
+            for part, other in zip(shown, whole, strict=True):
+                assert_shortens(part, other)
+        case float():
+            assert f"{shown:.6g}" == f"{whole:.6g}"
+        case _:
+            assert shown == whole
+
+
+CALL = next(block for block in blocks("README.md") if block.startswith("curl"))
+ANSWER = json.loads(next(block for block in blocks("README.md") if block.startswith("{")))
 
 
 # Names and units
