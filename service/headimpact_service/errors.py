@@ -116,6 +116,19 @@ PROBLEMS: Mapping[str, ProblemType] = MappingProxyType(
             "The impact with this `external_id` was deleted; sending it again does not bring it back.",
             "Give the record another `external_id` if it is meant to be a new impact.",
         ),
+        "idempotency-conflict": ProblemType(
+            409,
+            "This idempotency key is taken",
+            "The `Idempotency-Key` was sent before with another request: another file, or other fields beside it.",
+            "Send the same request to be told of the same job, or a new key for a new one.",
+        ),
+        "job-cancelled": ProblemType(
+            409,
+            "The job was cancelled",
+            "Somebody cancelled the job. It is the `problem` of a job, not an answer: what the job had stored until "
+            "then stays stored, and `result` counts it.",
+            "Order it again if it should go on: what is stored already is found, not stored twice.",
+        ),
         "precondition-failed": ProblemType(
             412,
             "The resource has changed",
@@ -204,6 +217,13 @@ PROBLEMS: Mapping[str, ProblemType] = MappingProxyType(
             "Something failed here",
             "A fault of the service. It is logged under the id in `detail`.",
             "Send the request again; if it stays, report the id to whoever runs the service.",
+        ),
+        "job-crashed": ProblemType(
+            500,
+            "The job was given up",
+            "The process that worked on the job ended three times without getting any further. It is the `problem` of "
+            "a job, not an answer: what the job had stored until then stays stored, and `result` counts it.",
+            "Look into the log for why the process ended, such as too little memory; then order the job again.",
         ),
         "unavailable": ProblemType(
             503,

@@ -213,3 +213,41 @@ scores = Table(
     Column("created_at", Instant, nullable=False),
     ForeignKeyConstraint(["impact_id", "revision"], ["impact_revisions.impact_id", "impact_revisions.revision"]),
 )
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False),
+    Column("key_id", ForeignKey("api_keys.id")),
+    Column("kind", String(32), nullable=False),
+    Column("idempotency_key", Text),
+    Column("request_hash", Digest),
+    Column("arguments", Document, nullable=False),
+    Column("state", String(16), nullable=False),
+    # A run is one attempt of one process; its number keeps an older run, still alive somewhere, from writing.
+    Column("run", Integer, nullable=False),
+    # Runs that began and did not end, since the job last got on.
+    Column("crashes", Integer, nullable=False),
+    Column("not_before", Instant),
+    Column("done", Integer, nullable=False),
+    Column("total", Integer),
+    Column("result", Document),
+    Column("problem", Document),
+    Column("created_at", Instant, nullable=False),
+    Column("updated_at", Instant, nullable=False),
+    Column("started_at", Instant),
+    Column("finished_at", Instant),
+    UniqueConstraint("data_set_id", "idempotency_key"),
+    Index(None, "data_set_id", "id"),
+    Index(None, "finished_at"),
+)
+
+job_chunks = Table(
+    "job_chunks",
+    metadata,
+    Column("job_id", ForeignKey("jobs.id"), primary_key=True),
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("outcome", Document, nullable=False),
+)
+"""What each part of an unfinished job came to, committed with what that part wrote: the mark that it is done."""

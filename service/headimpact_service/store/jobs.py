@@ -1,0 +1,165 @@
+"""Jobs as their owners see them: ordered in the caller's own transaction, read, listed, told to stop.
+
+What a process does that works on one is in :mod:`.job_runs`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+from sqlalchemy import Connection, bindparam, insert, select, update
+
+from headimpact_service.errors import Problem, not_found
+from headimpact_service.store import ids
+from headimpact_service.store.paging import Page, Position, keyset, page_of
+from headimpact_service.store.tables import jobs
+
+State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
+ENDED: frozenset[str] = frozenset({"succeeded", "failed", "cancelled"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewJob:
+    """A job to be done. `request_hash` says what was asked for, so that an idempotency key names one request only."""
+
+    kind: str
+    arguments: Mapping[str, Any]
+    key_id: bytes | None = None
+    idempotency_key: str | None = None
+    request_hash: bytes | None = None
+    id: bytes = field(default_factory=ids.new)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """A job as stored. `done` of `total` parts are committed; `total` is None until it is known."""
+
+    id: bytes
+    data_set_id: bytes
+    key_id: bytes | None
+    kind: str
+    idempotency_key: str | None
+    request_hash: bytes | None
+    arguments: Mapping[str, Any]
+    state: State
+    run: int
+    crashes: int
+    not_before: datetime | None
+    done: int
+    total: int | None
+    result: Mapping[str, Any] | None
+    problem: Mapping[str, Any] | None
+    created_at: datetime
+    updated_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more will happen to it."""
+        return self.state in ENDED
+
+
+_JOB = select(jobs)
+_OF_DATA_SET = _JOB.where(jobs.c.data_set_id == bindparam("data_set_id"))
+_ONE = _OF_DATA_SET.where(jobs.c.id == bindparam("job_id"))
+_BY_KEY = _OF_DATA_SET.where(jobs.c.idempotency_key == bindparam("idempotency_key"))
+_CANCEL = update(jobs).where(jobs.c.id == bindparam("job"))
+
+
+def submit(conn: Connection, data_set_id: bytes, new: NewJob) -> Job:
+    """Order a job in this transaction: it exists if and only if the rest of the transaction does.
+
+    The idempotency key of a job that exists gives that job, or an `idempotency-conflict` problem if it was ordered
+    by another request.
+    """
+    existing = find_same_request(conn, data_set_id, new.idempotency_key, new.request_hash)
+    if existing is not None:
+        return existing
+    now = datetime.now(UTC)
+    row = {
+        "id": new.id,
+        "data_set_id": data_set_id,
+        "key_id": new.key_id,
+        "kind": new.kind,
+        "idempotency_key": new.idempotency_key,
+        "request_hash": new.request_hash,
+        "arguments": dict(new.arguments),
+        "state": "queued",
+        "run": 1,
+        "crashes": 0,
+        "done": 0,
+        "created_at": now,
+        "updated_at": now,
+    }
+    conn.execute(insert(jobs), row)
+    return require(conn, data_set_id, new.id)
+
+
+def find_same_request(
+    conn: Connection, data_set_id: bytes, idempotency_key: str | None, request_hash: bytes | None
+) -> Job | None:
+    """The job that this idempotency key has made already; 409 if another request made it."""
+    if idempotency_key is None:
+        return None
+    row = conn.execute(_BY_KEY, {"data_set_id": data_set_id, "idempotency_key": idempotency_key}).mappings().first()
+    if row is None:
+        return None
+    found = Job(**row)
+    if found.request_hash != request_hash:
+        raise Problem("idempotency-conflict", "This Idempotency-Key was sent before with another request.")
+    return found
+
+
+def get(conn: Connection, data_set_id: bytes, job_id: bytes) -> Job | None:
+    """A job of the data set."""
+    row = conn.execute(_ONE, {"data_set_id": data_set_id, "job_id": job_id}).mappings().first()
+    return None if row is None else Job(**row)
+
+
+def require(conn: Connection, data_set_id: bytes, job_id: bytes) -> Job:
+    """The same, or a `not-found` problem."""
+    found = get(conn, data_set_id, job_id)
+    if found is None:
+        raise not_found("job")
+    return found
+
+
+def page(
+    conn: Connection,
+    data_set_id: bytes,
+    *,
+    kinds: Collection[str],
+    state: str | None = None,
+    limit: int = 100,
+    after: Position | None = None,
+) -> Page[Job]:
+    """A page of the jobs of these kinds, newest first."""
+    query = _OF_DATA_SET.where(jobs.c.kind.in_(sorted(kinds)))
+    if state is not None:
+        query = query.where(jobs.c.state == state)
+    query = keyset(query, jobs, updated_since=None, after=after, limit=limit)
+    rows = conn.execute(query, {"data_set_id": data_set_id}).mappings()
+    return page_of([Job(**row) for row in rows], limit)
+
+
+def cancel(conn: Connection, data_set_id: bytes, job_id: bytes) -> Job:
+    """Tell a job to stop. One that never began is over at once; another stops before its next part.
+
+    A job that is stopping or was cancelled stays as it is; one that has ended otherwise is a `conflict`.
+    """
+    found = require(conn, data_set_id, job_id)
+    if found.state in {"cancelling", "cancelled"}:
+        return found
+    if found.ended:
+        raise Problem("conflict", "The job has ended; nothing is left to cancel.")
+    now = datetime.now(UTC)
+    values: dict[str, Any] = {"state": "cancelling", "not_before": None, "updated_at": now}
+    if found.started_at is None:
+        problem = Problem("job-cancelled", "Cancelled before it began; nothing was changed.")
+        values |= {"state": "cancelled", "finished_at": now, "problem": problem.as_dict()}
+    conn.execute(_CANCEL, {"job": job_id, **values})
+    return require(conn, data_set_id, job_id)

@@ -1,0 +1,54 @@
+"""Uploaded files: small ones in memory, large ones in a folder, none left behind."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from headimpact_service.store.uploads import Uploads
+
+
+@pytest.fixture
+def uploads(tmp_path: Path) -> Uploads:
+    return Uploads(tmp_path / "uploads")
+
+
+def test_a_small_file_stays_in_memory_and_nothing_is_made(uploads: Uploads) -> None:
+    with uploads.receive(10) as incoming:
+        incoming.write(b"01234")
+        incoming.write(b"56789")
+        assert (incoming.contents(), incoming.is_large) == (b"0123456789", False)
+    assert not uploads.folder.exists()
+
+
+@pytest.mark.parametrize("size", [3, 30])
+def test_a_file_that_is_kept_is_there_whole_for_this_user_only(uploads: Uploads, size: int) -> None:
+    with uploads.receive(10) as incoming:
+        for _ in range(size):
+            incoming.write(b"x")
+        assert incoming.digest() == sha256(b"x" * size).digest()
+        incoming.keep("job_1")
+    assert uploads.path("job_1").read_bytes() == b"x" * size
+    assert uploads.path("job_1").stat().st_mode & 0o077 == 0
+    assert [path.name for path in uploads.folder.iterdir()] == ["job_1"]
+
+
+def test_a_file_that_is_not_kept_leaves_nothing(uploads: Uploads) -> None:
+    with uploads.receive(2) as incoming:
+        incoming.write(b"0123456789")
+        assert list(uploads.folder.iterdir())
+    assert list(uploads.folder.iterdir()) == []
+
+
+def test_orphans_are_deleted_and_files_of_jobs_are_not(uploads: Uploads) -> None:
+    for name in ("job_1", "job_2"):
+        with uploads.receive(0) as incoming:
+            incoming.write(b"x")
+            incoming.keep(name)
+    assert uploads.remove_orphans({"job_1"}, older_than_s=3600) == 0
+    assert uploads.remove_orphans({"job_1"}, older_than_s=0) == 1
+    assert [path.name for path in uploads.folder.iterdir()] == ["job_1"]
+    uploads.remove("job_1")
+    uploads.remove("job_1")
