@@ -63,7 +63,12 @@ def _request_id(scope: Scope) -> bytes:
     for name, value in scope["headers"]:
         if name == b"x-request-id" and _USABLE_ID.fullmatch(value):
             return bytes(value)
-    return os.urandom(12).hex().encode()
+    return new_request_id().encode()
+
+
+def new_request_id() -> str:
+    """An id for a request that brought none."""
+    return os.urandom(12).hex()
 
 
 def _fields(scope: Scope, request_id: bytes) -> dict[str, Any]:

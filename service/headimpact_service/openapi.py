@@ -27,6 +27,7 @@ _WITH_BODY = (
     "unsupported-media-type",
     "invalid-payload",
 )
+_HEADER_SCHEMAS = {"If-Match": {"type": "string", "pattern": r'^("[1-9][0-9]{0,8}"|\*)$'}}
 _PROBLEM_HEADERS = {401: "WWW-Authenticate", 429: "Retry-After", 503: "Retry-After"}
 _ABOUT = """\
 Head-impact traces in; brain angles, injury criteria and concussion probabilities out, after Laksari, Fanton et al.,
@@ -139,7 +140,7 @@ def _query_parameter(name: str, schema: dict[str, Any], *, required: bool) -> di
 
 def _header_parameters(operation: Operation) -> list[dict[str, Any]]:
     return [
-        {"name": name, "in": "header", "required": False, "description": description, "schema": {"type": "string"}}
+        {"name": name, "in": "header", "required": False, "description": description, "schema": _HEADER_SCHEMAS[name]}
         for name, description in operation.request_headers.items()
     ]
 
@@ -150,7 +151,8 @@ def _body(form: BodyForm, references: References) -> dict[str, Any]:
         if form.media_type != "text/csv":
             schema["format"] = "binary"
         return {"schema": schema}
-    return {"schema": references[form.model, "validation"]}
+    described = {"schema": references[form.model, "validation"]}
+    return described if form.example is None else {**described, "example": form.example}
 
 
 def _responses(operation: Operation, references: References) -> dict[str, Any]:

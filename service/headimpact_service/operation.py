@@ -50,6 +50,8 @@ class BodyForm:
 
     media_type: str
     model: type[BaseModel] | None
+    example: Mapping[str, Any] | None = None
+    """A whole body that is taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +151,7 @@ class Routes:
         *,
         query: type[Query] = NoQuery,
         body: type[BaseModel] | None = None,
+        example: Mapping[str, Any] | None = None,
         body_forms: Sequence[BodyForm] = (),
         body_required: bool = True,
         request_headers: Mapping[str, str] | None = None,
@@ -157,9 +160,10 @@ class Routes:
     ) -> Callable[[Handler], Handler]:
         """Declare the decorated function as an operation.
 
-        With `body` the body is read and validated here; `body_forms` alone documents one that the handler reads.
+        With `body` the body is read and validated here, and `example` is one that is taken; `body_forms` alone
+        documents a body that the handler reads.
         """
-        forms = tuple(body_forms) or ((BodyForm(JSON, body),) if body is not None else ())
+        forms = tuple(body_forms) or ((BodyForm(JSON, body, example),) if body is not None else ())
 
         def declare(handler: Handler) -> Handler:
             self.operations.append(

@@ -44,9 +44,10 @@ def _decimal(text: object) -> object:
     return text
 
 
-WholeNumber = Annotated[int, BeforeValidator(_whole)]
+# Bounds stand before the reading of the text: behind it, they would not show in the documentation.
+PageSize = Annotated[int, Field(ge=1, le=1000), BeforeValidator(_whole)]
+Probability = Annotated[float, Field(ge=0, le=1), BeforeValidator(_decimal)]
 Instant = Annotated[datetime, BeforeValidator(_instant), WithJsonSchema({"type": "string", "format": "date-time"})]
-Fraction = Annotated[float, BeforeValidator(_decimal)]
 Flag = Annotated[bool, BeforeValidator(_flag)]
 
 
@@ -66,7 +67,7 @@ Q = TypeVar("Q", bound=Query)
 class ListQuery(Query):
     """What every list takes."""
 
-    limit: Annotated[WholeNumber, Field(ge=1, le=1000, description="Rows on a page.")] = 100
+    limit: Annotated[PageSize, Field(description="Rows on a page.")] = 100
     cursor: Annotated[
         str | None, Field(min_length=1, max_length=1000, description="`next_cursor` of the page before, unchanged.")
     ] = None

@@ -11,6 +11,9 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from headimpact_service.answers import PROBLEM_JSON, json_bytes
+from headimpact_service.errors import Problem
+from headimpact_service.middleware import new_request_id
 from headimpact_service.settings import Settings
 
 SHUTDOWN_S = 20
@@ -59,6 +62,18 @@ class GuardedProtocol(HttpToolsProtocol):
         super().on_response_complete()
         if self.cycle.more_body and not self.transport.is_closing():
             self._expect_within(self.rest_timeout_s)
+
+    def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's own words are not for callers
+        """What is no HTTP, or a head of more than 64 KiB, gets the same form of answer as everything else."""
+        problem = Problem("malformed-request", "This is not an HTTP/1.1 request, or its head is too long.")
+        body = json_bytes(problem.as_dict())
+        head = (
+            "HTTP/1.1 400 Bad Request\r\n"
+            f"content-type: {PROBLEM_JSON}\r\ncontent-length: {len(body)}\r\n"
+            f"x-request-id: {new_request_id()}\r\nconnection: close\r\n\r\n"
+        )
+        self.transport.write(head.encode() + body)
+        self.transport.close()
 
     def _expect_within(self, seconds: float) -> None:
         self._met()

@@ -111,6 +111,8 @@ def pointer(steps: Sequence[object]) -> str:
 def _payload_error(fault: ErrorDetails, document: Any) -> PayloadError:  # noqa: ANN401 - any JSON
     steps = _steps(fault, document)
     code, sentence = _RULES.get(fault["type"], ("invalid", "The value does not fit this field."))
+    if fault["type"] == "value_error":  # raised by a validator of our own, in a sentence of our own
+        sentence = "{error}"
     detail = sentence.format_map(fault.get("ctx", {}))
     if code in {"too-short", "too-long"} and steps and steps[-1] in _SAMPLES:
         detail = detail.replace("entries", "samples")

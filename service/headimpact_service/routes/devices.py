@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import quote
 
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError, WithJsonSchema
 from starlette.responses import Response
 
-from headimpact_service import deps
+from headimpact_service import deps, examples
 from headimpact_service.answers import answer
 from headimpact_service.errors import invalid_parameter, not_found
-from headimpact_service.ingest.impact_json import MountingBody, Name, Strict, Text, Word
+from headimpact_service.ingest.impact_json import PRINTABLE, MountingBody, Name, Strict, Text, Word
 from headimpact_service.ingest.impact_reading import mounting
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import SyncQuery
@@ -22,6 +22,21 @@ from headimpact_service.store import devices, ids
 from headimpact_service.store.devices import Device, DeviceFields
 
 routes = Routes("devices")
+
+
+Metadata = Annotated[
+    dict[Word, Text],
+    Field(max_length=50),
+    # pydantic would describe the values of well-formed keys only, and leave every other key open.
+    WithJsonSchema(
+        {
+            "type": "object",
+            "maxProperties": 50,
+            "propertyNames": {"minLength": 1, "maxLength": 64, "pattern": PRINTABLE},
+            "additionalProperties": {"type": "string", "minLength": 1, "maxLength": 2000, "pattern": PRINTABLE},
+        }
+    ),
+]
 
 
 class DeviceBody(Strict):
@@ -34,7 +49,7 @@ class DeviceBody(Strict):
     angular_velocity_range_rad_s: float | None = Field(None, gt=0, le=10_000, description="Full scale [rad/s].")
     trigger_threshold_g: float | None = Field(None, ge=0, le=10_000, description="Starts a record [g].")
     mounting: MountingBody | None = Field(None, description="Used where an impact says `sensor` and brings none.")
-    metadata: dict[Word, Text] = Field(default_factory=dict, max_length=50, description="Anything else, as text.")
+    metadata: Metadata = Field(default_factory=dict, description="Anything else, as text.")
 
 
 class DeviceView(BaseModel):
@@ -81,6 +96,7 @@ ETAG = {"ETag": "The revision, for If-Match."}
         201: Answer(DeviceView, "The new device.", headers=ETAG | {"Location": "Its address."}),
     },
     body=DeviceBody,
+    example=examples.device(),
     request_headers=IF_MATCH,
     problems=("precondition-failed", "improper-rotation"),
 )

@@ -185,6 +185,7 @@ async def list_scores(call: Call) -> Response:
     "impacts:write",
     {201: Answer(StoredScoreView, "The new score."), 200: Answer(StoredScoreView, "The same score was there.")},
     body=NewScoreBody,
+    example={"model": "laksari-2020"},
     problems=("not-found", "operating-point-unreachable"),
 )
 async def create_score(call: Call) -> Response:

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 from starlette.responses import Response
 
-from headimpact_service import deps
+from headimpact_service import deps, examples
 from headimpact_service.answers import answer, json_bytes, no_content
 from headimpact_service.errors import invalid_parameter, not_found
 from headimpact_service.ingest.digest import content_digest
@@ -18,7 +18,7 @@ from headimpact_service.intake.rendering import scored_traces
 from headimpact_service.intake.scoring import Scored, digest_bytes
 from headimpact_service.intake.storing import new_impact
 from headimpact_service.operation import Answer, Call, Routes
-from headimpact_service.parameters import Fraction, Instant, SyncQuery
+from headimpact_service.parameters import Instant, Probability, SyncQuery
 from headimpact_service.routes.impact_shapes import COLUMNS, ImpactList, ImpactView, impact_cells, impact_document
 from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
@@ -43,6 +43,7 @@ Text = Annotated[str | None, Field(min_length=1, max_length=200)]
         200: Answer(ImpactView, "It was stored before, with this content.", headers=ETAG | LOCATION),
     },
     body=ImpactBody,
+    example=examples.impact(),
     problems=(*RECORD_PROBLEMS, "external-id-conflict", "impact-deleted"),
 )
 async def create_impact(call: Call) -> Response:
@@ -81,7 +82,7 @@ class ImpactQuery(SyncQuery):
     quality_code: Annotated[str | None, Field(pattern=r"^[a-z_]{1,64}$", description="With this quality note.")] = None
     criterion: Annotated[CriterionKey | None, Field(description="The one that `min_probability` is about.")] = None
     min_probability: Annotated[
-        Fraction | None, Field(ge=0, le=1, description="Where `criterion` gives at least this probability.")
+        Probability | None, Field(description="Where `criterion` gives at least this probability.")
     ] = None
 
 
@@ -163,6 +164,7 @@ def identifier(call: Call) -> bytes:
     "impacts:write",
     {200: Answer(ImpactView, "The impact as it is now.", headers=ETAG | LOCATION)},
     body=ImpactBody,
+    example=examples.impact(),
     request_headers=IF_MATCH,
     problems=(
         *RECORD_PROBLEMS,

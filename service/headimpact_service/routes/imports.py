@@ -35,7 +35,7 @@ class ImportQuery(Query):
     """What comes beside the file, as query parameters or form fields; a field given overrides the file."""
 
     preset: FieldText = Field(None, description="A device's layout, as `GET /v1/presets` lists them.")
-    mapping: str | None = Field(None, max_length=60_000, description="JSON: which column is what.")
+    mapping: str | None = Field(None, max_length=4000, description="JSON: which column is what.")
     athlete: FieldText = Field(None, description="Your id of the athlete.")
     device: FieldText = Field(None, description="Serial number of the device.")
     occurred_at: FieldText = Field(None, description="RFC 3339, or a local time with `time_zone`.")

@@ -82,6 +82,7 @@ async def list_keys(call: Call) -> Response:
     "admin",
     {201: Answer(NewKeyView, "The key, shown this once.")},
     body=NewKeyBody,
+    example={"name": "sideline gate", "scopes": ["score", "impacts:write"]},
 )
 async def create_key(call: Call) -> Response:
     """The key belongs to the caller's organisation."""

@@ -7,6 +7,7 @@ from functools import partial
 from anyio.to_thread import run_sync
 from starlette.responses import Response
 
+from headimpact_service import examples
 from headimpact_service.answers import answer
 from headimpact_service.ingest.impact_json import ScoreBody
 from headimpact_service.ingest.impact_reading import to_record
@@ -31,6 +32,7 @@ RECORD_PROBLEMS = ("invalid-trace", "improper-rotation", "mounting-missing", "op
     "score",
     {200: Answer(ScoreView, "The score.")},
     body=ScoreBody,
+    example=examples.score(),
     problems=RECORD_PROBLEMS,
 )
 async def score_impact(call: Call) -> Response:

@@ -64,6 +64,7 @@ async def read_settings(call: Call) -> Response:
     "admin",
     {200: Answer(SettingsView, "As set now.", headers=ETAG)},
     body=SettingsBody,
+    example={"incidence": 0.0055, "operating_points": [{"criterion": "bam", "sensitivity": 0.9}]},
     request_headers=IF_MATCH,
     problems=("precondition-failed", "operating-point-unreachable"),
 )

@@ -55,6 +55,12 @@ class TestCreate:
         assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, f"/{field}")
 
 
+    def test_an_unknown_zone_is_refused_in_words(self, api: Api) -> None:
+        answer = api.post("/v1/athletes", json={"time_zone": "Mars/Base"})
+        assert "IANA" in answer.json()["errors"][0]["detail"]
+        assert "Mars" not in answer.text
+
+
 class TestChange:
     def test_fields_that_are_left_out_stay_and_null_clears(self, api: Api) -> None:
         made = api.post("/v1/athletes", json=WHOLE)
