@@ -16,11 +16,12 @@ from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import list_presets
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.upload import read_upload
+from headimpact_service.intake.importing import preview_row, summary
 from headimpact_service.operation import ANY_KEY, Answer, BodyForm, Call, Routes
 from headimpact_service.parameters import Flag, Query, validate_parameters
 from headimpact_service.problem_shapes import ProblemDocument
 from headimpact_service.routes.impact_shapes import KinematicsView
-from headimpact_service.routes.import_flow import preview_row, score_all, store_all
+from headimpact_service.routes.import_flow import score_all, store_all
 from headimpact_service.routes.score_shapes import PeaksView, QualityView
 from headimpact_service.routes.uploads import MULTIPART, RAW, Upload, read_file
 
@@ -133,9 +134,7 @@ async def import_file(call: Call) -> Response:
         rows = [preview_row(index, item) for index, item in enumerate(items)]
     else:
         rows = await store_all(call, items)
-    counted = ("created", "unchanged", "failed")
-    summary = {status: sum(row["status"] == status for row in rows) for status in counted}
-    return answer({"data": rows, "summary": summary}, 207)
+    return answer({"data": rows, "summary": summary(rows)}, 207)
 
 
 def _options(upload: Upload) -> tuple[ImportOptions, bool]:

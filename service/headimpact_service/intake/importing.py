@@ -1,0 +1,131 @@
+"""What an import does with the records of a file: look up, score together, make rows, store, say what became of each.
+
+One request does it for a small file and a job for a large one, part by part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.digest import content_digest
+from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
+from headimpact_service.intake.facts import facts_in
+from headimpact_service.intake.records import describe, kinematics_document
+from headimpact_service.intake.rendering import new_score, score_document
+from headimpact_service.intake.scoring import DeviceFacts, Scored, Terms, digest_bytes, score_records
+from headimpact_service.intake.storing import new_impact
+from headimpact_service.store import ids, impacts
+from headimpact_service.store.impacts import NewImpact
+
+Found = Sequence[ImpactRecord | Problem]
+"""Impacts as they were read, in the file's order; a fault of one stands in its place."""
+Known = list[tuple[ImpactRecord, DeviceFacts] | None]
+
+COUNTED = ("created", "unchanged", "failed")
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One impact of a file, and what became of it so far."""
+
+    external_id: str | None
+    outcome: Scored | Problem
+    sent_digest: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """One impact of a file as it can be stored, or why it cannot."""
+
+    external_id: str | None
+    new: NewImpact | Problem
+
+
+def look_up(conn: Any, data_set_id: bytes, found: Found) -> Known:  # noqa: ANN401 - a connection of the store
+    """What the devices and athletes of the records add to them."""
+    facts = facts_in(conn, data_set_id)
+    return [None if isinstance(record, Problem) else facts(record) for record in found]
+
+
+def score_found(found: Found, known: Known, terms: Terms) -> list[Item]:
+    """Every impact scored, or its problem."""
+    scored = iter(score_records([pair for pair in known if pair is not None], terms))
+    return [_item(record, None if isinstance(record, Problem) else next(scored)) for record in found]
+
+
+def _item(record: ImpactRecord | Problem, scored: Scored | Problem | None) -> Item:
+    if isinstance(record, Problem):
+        return Item(record.external_id if isinstance(record, RefusedImpact) else None, record)
+    assert scored is not None
+    return Item(record.external_id, scored, digest_bytes(content_digest(record)))
+
+
+def make_ready(items: Iterable[Item], key_id: bytes | None) -> list[Ready]:
+    """The rows of the store."""
+    return [
+        Ready(
+            item.external_id,
+            item.outcome if isinstance(item.outcome, Problem) else new_impact(item.outcome, item.sent_digest, key_id),
+        )
+        for item in items
+    ]
+
+
+def store(conn: Any, data_set_id: bytes, ready: Sequence[Ready], first: int) -> list[dict[str, Any]]:  # noqa: ANN401
+    """Add what can be added, in one transaction; what became of each, numbered from `first`.
+
+    A refusal comes before anything of that impact is written, so the others stay.
+    """
+    return [_stored(conn, data_set_id, item, index) for index, item in enumerate(ready, first)]
+
+
+def _stored(conn: Any, data_set_id: bytes, item: Ready, index: int) -> dict[str, Any]:  # noqa: ANN401
+    if isinstance(item.new, Problem):
+        return failed_row(index, item.external_id, item.new)
+    try:
+        outcome = impacts.add(conn, data_set_id, item.new, same_event_is_unchanged=True)
+    except Problem as problem:
+        return failed_row(index, item.external_id, problem)
+    row = {"index": index, "external_id": item.external_id or outcome.impact.external_id}
+    return row | {"status": outcome.status, "id": ids.encode("imp", outcome.impact.id), "problem": None}
+
+
+def failed_row(index: int, external_id: str | None, problem: Problem) -> dict[str, Any]:
+    """The row of an impact that was refused."""
+    row = {"index": index, "external_id": external_id, "status": "failed", "id": None}
+    return row | {"problem": problem.as_dict()}
+
+
+def summary(rows: Iterable[dict[str, Any]]) -> dict[str, int]:
+    """How many were created, unchanged and failed."""
+    counts = dict.fromkeys(COUNTED, 0)
+    for row in rows:
+        if row["status"] in counts:
+            counts[row["status"]] += 1
+    return counts
+
+
+def preview_row(index: int, item: Item) -> dict[str, Any]:
+    """The row of a dry run: what was understood, and what would be noted."""
+    if isinstance(item.outcome, Problem):
+        return failed_row(index, item.external_id, item.outcome)
+    row = {"index": index, "external_id": item.external_id, "status": "readable", "id": None, "problem": None}
+    return row | {"preview": _preview(item.outcome)}
+
+
+def _preview(scored: Scored) -> dict[str, Any]:
+    record = scored.record
+    document = score_document(new_score(scored))
+    return {
+        "athlete": record.athlete_external_id or record.athlete_id,
+        "device": record.device_serial,
+        "occurred_at": record.occurred_at,
+        "kinematics": kinematics_document(describe(record)),
+        "source": dict(record.metadata),
+        "state": document["state"],
+        "peaks": document["peaks"],
+        "quality": document["quality"],
+    }
