@@ -14,6 +14,7 @@ import numpy as np
 
 from headimpact.errors import TraceError
 from headimpact.filtering import AppliedFilter, CutOff, corner_frequency, low_pass
+from headimpact.gaps import fill_gaps
 from headimpact.kinematics import (
     STANDARD_GRAVITY,
     FloatArray,
@@ -33,7 +34,7 @@ from headimpact.quality import (
     check_rate,
     words,
 )
-from headimpact.recording import Recording, Signal, SignalName
+from headimpact.recording import Mounting, Recording, Signal, SignalName
 
 TO_CRITERIA_UNIT: dict[str, float] = {
     "g": 1.0,
@@ -86,17 +87,21 @@ def prepare(recording: Recording) -> Preparation:
     TraceError
         The recording breaks a rule; its code, signal, channel and sample say which and where.
     """
+    notes: list[QualityNote] = []
+    if recording.fill_gaps:
+        recording = _without_gaps(recording, notes)
     signals = recording.signals()
     if not signals:
         raise TraceError("no-signal", "A recording needs linear acceleration, angular velocity or both.")
     _require_motion(signals)
-    notes: list[QualityNote] = []
     clock_start_s = min((float(s.time_s[0]) for _, s in signals if s.time_s is not None), default=0.0)
     sent = {name: _uniform(name, signal, clock_start_s, notes) for name, signal in signals}
     notes += _notes_as_sent(recording, sent)
     filtered, filters = _filtered(recording, sent, notes)
     sources = _with_derived(filtered, sent, notes)
     in_head = {name: _to_head_axes(name, signal, recording) for name, signal in filtered.items()}
+    if recording.mounting is not None:
+        in_head = {name: _undelayed(name, signal, recording.mounting) for name, signal in in_head.items()}
     if recording.constrained_plane is not None:
         in_head = {name: _constrain(name, s, recording.constrained_plane, notes) for name, s in in_head.items()}
     rate, start_s, aligned = _one_time_base(in_head)
@@ -112,6 +117,17 @@ def prepare(recording: Recording) -> Preparation:
         start_time_ms=start_ms,
     )
     return Preparation(kinematics, filters, tuple(notes), *sources, recording.pre_trigger_ms is not None)
+
+
+def _without_gaps(recording: Recording, notes: list[QualityNote]) -> Recording:
+    """The recording with its short gaps filled, each signal's noted."""
+    filled: dict[SignalName, Signal] = {}
+    for name, signal in recording.signals():
+        filled[name], count = fill_gaps(signal)
+        if count:
+            detail = f"{count} missing samples of the {words(name)} were filled by interpolation."
+            notes.append(QualityNote("gaps_filled", "note", detail, name))
+    return replace(recording, **filled)  # type: ignore[arg-type] # the keys are its fields
 
 
 def _require_motion(signals: list[tuple[SignalName, Signal]]) -> None:
@@ -364,6 +380,13 @@ def _to_head_axes(name: SignalName, signal: _Uniform, recording: Recording) -> _
     if recording.axes == "sae_j211":
         values = values * SAE_J211_TO_ANATOMICAL
     return signal if values is signal.values else replace(signal, values=values)
+
+
+def _undelayed(name: SignalName, signal: _Uniform, mounting: Mounting) -> _Uniform:
+    """A signal at the time of the motion rather than at that of its sensor's samples."""
+    linear = name == "linear_acceleration"
+    delay_s = mounting.accelerometer_delay_s if linear else mounting.gyroscope_delay_s
+    return replace(signal, start_s=signal.start_s - delay_s) if delay_s else signal
 
 
 def _constrain(name: SignalName, signal: _Uniform, plane: str, notes: list[QualityNote]) -> _Uniform:

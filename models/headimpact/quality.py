@@ -6,6 +6,7 @@ kinematics of the head's centre of gravity.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -185,6 +186,67 @@ def check_angular_acceleration(supplied: FloatArray, derived: FloatArray) -> Ite
             f"{correlation:.3f}, under {bound:g}.",
             "angular_acceleration",
         )
+
+
+def check_reported_resultant(signal: str, unit: str, reported: FloatArray, values: FloatArray) -> Iterator[QualityNote]:
+    """Resultants that a device supplies against those of its own samples.
+
+    Parameters
+    ----------
+    signal, unit
+        What is compared, and the unit of both.
+    reported
+        The supplied resultant, n samples; a value that is no number is not compared.
+    values
+        The signal as sent, n x 3.
+    """
+    own = np.sqrt((values * values).sum(axis=1))
+    difference = np.abs(reported - own)
+    if not np.isfinite(difference).any():
+        return
+    worst = int(np.nanargmax(difference))
+    if difference[worst] > QUALITY_LIMITS["reported"]["tolerance"] * float(np.nanmax(own)):
+        yield _mismatch(signal, f"resultant at sample {worst}", unit, float(reported[worst]), float(own[worst]))
+
+
+def check_reported_peak(signal: str, unit: str, reported: float, values: FloatArray) -> Iterator[QualityNote]:
+    """A peak resultant that a device supplies against that of its own samples."""
+    own = np.sqrt((values * values).sum(axis=1))
+    if not np.isfinite(own).any():
+        return
+    peak = float(np.nanmax(own))
+    if abs(reported - peak) > QUALITY_LIMITS["reported"]["tolerance"] * peak:
+        yield _mismatch(signal, "peak resultant", unit, reported, peak)
+
+
+def _mismatch(signal: str, what: str, unit: str, reported: float, own: float) -> QualityNote:
+    return QualityNote(
+        "vendor_peak_mismatch",
+        "warning",
+        f"The supplied {what} of the {words(signal)} is {reported:.5g} {unit} where the samples give {own:.5g} {unit}.",
+        signal,
+    )
+
+
+def population_reason(sex: str | None, age_years: float | None, level: str | None) -> str | None:
+    """Why a person is outside the published model's population of adult men, as far as that is known."""
+    limits = QUALITY_LIMITS["population"]
+    if sex is not None and sex != "male":
+        return "sex"
+    if age_years is not None and age_years < limits["adult_age_years"]:
+        return f"under {limits['adult_age_years']} years"
+    if level is not None and _is_youth(level, limits["youth_levels"]):
+        return "a youth level of play"
+    return None
+
+
+def _is_youth(level: str, youth_levels: list[str]) -> bool:
+    """Whether a level of play is one of youth: one of the common words, or an age group below 18 such as U16."""
+    word = "_".join(re.findall(r"[a-z]+|[0-9]+", level.casefold()))
+    group = re.fullmatch(r"u(?:nder)?_([0-9]{1,2})", word)
+    if group is not None:
+        return bool(int(group[1]) <= QUALITY_LIMITS["population"]["adult_age_years"])
+    return word in youth_levels or word.startswith("youth_")
 
 
 def check_units(kinematics: HeadKinematics) -> Iterator[QualityNote]:

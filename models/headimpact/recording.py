@@ -61,6 +61,8 @@ class Mounting:
     offset_m
         The accelerometer's position relative to the head's centre of gravity, in the head axes that the rotations
         lead to [m].
+    accelerometer_delay_s, gyroscope_delay_s
+        How much later than the motion each sensor's samples are stamped [s].
 
     Raises
     ------
@@ -71,6 +73,8 @@ class Mounting:
     accelerometer_rotation: FloatArray
     gyroscope_rotation: FloatArray
     offset_m: FloatArray
+    accelerometer_delay_s: float = 0.0
+    gyroscope_delay_s: float = 0.0
 
     def __post_init__(self) -> None:
         for sensor, rotation in (
@@ -99,6 +103,8 @@ class Recording:
         The zero-phase low-pass filters to apply.
     pre_trigger_ms
         Time from the record's first sample to the trigger [ms]; None where the trigger is not known.
+    fill_gaps
+        Whether gaps of at most 2 samples are filled; otherwise a missing sample is refused.
     """
 
     linear_acceleration: Signal | None = None
@@ -109,6 +115,7 @@ class Recording:
     constrained_plane: PlaneName | None = None
     low_pass: LowPass = PAPER
     pre_trigger_ms: float | None = None
+    fill_gaps: bool = False
 
     def signals(self) -> list[tuple[SignalName, Signal]]:
         """The signals that are there, each with its name."""

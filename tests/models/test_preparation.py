@@ -243,3 +243,27 @@ def test_a_rate_under_ten_times_the_channel_frequency_class_is_noted(rate_hz, no
     found = prepare(Recording(Signal(a, "g", rate_hz), low_pass=LowPass(linear_acceleration="CFC180")))
     assert ("low_rate_for_class" in codes(found)) == noted
     assert found.filters[0].applied
+
+
+@pytest.mark.parametrize("sensor", ["accelerometer", "gyroscope"])
+def test_a_sensors_delay_is_taken_off_its_samples(sensor):
+    # the same motion, with one sensor's samples 4 ms late, is the same motion again once the delay is known
+    generator = np.random.default_rng(11)
+    a, w = burst(generator, 140, 30.0), burst(generator, 140, 8.0)
+    late = {"accelerometer": (a[16:116], w[20:120]), "gyroscope": (a[20:120], w[16:116])}[sensor]
+    still = {"accelerometer_rotation": np.eye(3), "gyroscope_rotation": np.eye(3), "offset_m": np.array([0.07, 0, 0])}
+    true = Recording(
+        Signal(a[20:120], "g", 1e3), Signal(w[20:120], "rad/s", 1e3), mounting=Mounting(**still), low_pass=NO_FILTER
+    )
+    delayed = replace(
+        true,
+        linear_acceleration=Signal(late[0], "g", 1e3),
+        angular_velocity=Signal(late[1], "rad/s", 1e3),
+        mounting=Mounting(**still, **{f"{sensor}_delay_s": 0.004}),
+    )
+    expected, found = prepare(true).kinematics, prepare(delayed).kinematics
+    assert found.samples == 96
+    shift = round(found.start_time_ms - expected.start_time_ms)
+    window = slice(shift + 2, shift + 94)
+    np.testing.assert_allclose(found.angular_velocity[2:94], expected.angular_velocity[window], atol=1e-12)
+    np.testing.assert_allclose(found.linear_acceleration_g[2:94], expected.linear_acceleration_g[window], atol=1e-9)
