@@ -231,7 +231,7 @@ def test_risk_rises_with_a_component_exactly_where_its_coefficient_is_negative(k
 def test_probability_and_linear_predictor_are_each_others_inverse_and_never_overflow(e):
     p = probability_of(e)
     assert 0.0 <= p <= 1.0
-    if abs(e) < 30:
+    if abs(e) < 12:
         assert linear_predictor_of(p) == pytest.approx(e, rel=1e-6, abs=1e-9)
 
 
