@@ -8,8 +8,7 @@ from headimpact_service.examples import impact
 
 
 def curl(address: str, key: str) -> str:
-    """One command for a POSIX shell."""
-    # A line for each list of samples; no quote in it, because the shell's quotes are around it.
-    body = json.dumps(impact("first-impact"), separators=(",", ":")).replace(',"', ',\n"')
+    """One command for a POSIX shell, on one line so that nothing is lost on its way through a terminal."""
+    body = json.dumps(impact("first-impact"), separators=(",", ":"))
     headers = f"-H 'Authorization: Bearer {key}' -H 'Content-Type: application/json'"
-    return f"curl -sS '{address}/v1/impacts' {headers} -d '\n{body}'"
+    return f"curl -sS '{address}/v1/impacts' {headers} -d '{body}'"

@@ -1,0 +1,189 @@
+"""The commands of `headimpact`."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conforming import document
+from sending import Api, impact_body, score_body
+
+from headimpact_service import __main__ as command_line
+from headimpact_service.deps import SCOPES
+from headimpact_service.pages.problems import as_markdown
+from headimpact_service.store import keys
+from headimpact_service.store.database import Database
+
+Run = Callable[..., tuple[int, str, str]]
+
+SWA = "Date,Time,Session ID,Player ID,Sensor ID,Impact ID,Sample Num,Linear Acc x g,Linear Acc y g,Linear Acc z g\n"
+
+
+@pytest.fixture
+def run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str, str]]:
+    """Runs a command in an empty folder: its exit code and what it printed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["headimpact", *arguments])
+        code = 0
+        try:
+            command_line.main()
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run
+
+
+class TestKeys:
+    def test_the_last_line_printed_is_a_key_that_the_service_takes(self, run: Run, tmp_path: Path) -> None:
+        code, printed, _ = run(
+            "keys", "create", "--organisation", "Leinster", "--scope", "score", "--scope", "impacts:read"
+        )
+        assert code == 0
+        key = printed.splitlines()[-1]
+        database = Database(f"sqlite:///{tmp_path / 'headimpact.db'}")
+        with database.read() as conn:
+            found = keys.find_key(conn, key)
+        database.close()
+        assert found is not None
+        assert (found.organisation_name, found.scopes) == ("Leinster", {"score", "impacts:read"})
+
+    def test_all_is_every_scope_and_an_organisation_is_reused_by_its_name(self, run: Run, tmp_path: Path) -> None:
+        made = [
+            run("keys", "create", "--organisation", "A", "--scope", "all", "--mode", mode)[1]
+            for mode in ("live", "test")
+        ]
+        database = Database(f"sqlite:///{tmp_path / 'headimpact.db'}")
+        with database.read() as conn:
+            live, test = (keys.find_key(conn, printed.splitlines()[-1]) for printed in made)
+        database.close()
+        assert live is not None
+        assert test is not None
+        assert live.scopes == set(SCOPES)
+        assert live.organisation_id == test.organisation_id
+        assert live.data_set_id != test.data_set_id
+
+    def test_an_unknown_scope_is_one_line_and_exit_code_2(self, run: Run) -> None:
+        code, printed, failed = run("keys", "create", "--organisation", "A", "--scope", "root")
+        assert (code, printed, len(failed.splitlines())) == (2, "", 1)
+
+    def test_keys_are_listed_and_revoked(self, run: Run) -> None:
+        _, printed, _ = run("keys", "create", "--organisation", "A", "--scope", "score")
+        key_id = printed.split()[1]
+        assert key_id in run("keys", "list", "--organisation", "A")[1]
+        assert run("keys", "revoke", key_id, "--organisation", "A")[0] == 0
+        assert run("keys", "revoke", "nonsense", "--organisation", "A")[0] == 2
+        assert run("keys", "list", "--organisation", "B")[0] == 2
+
+
+class TestScore:
+    def test_json_is_the_answer_of_the_api(self, run: Run, api: Api, tmp_path: Path) -> None:
+        file = tmp_path / "impact.json"
+        file.write_text(json.dumps(impact_body("e-1")))
+        code, printed, _ = run("score", str(file), "--json")
+        assert code == 0
+        assert json.loads(printed) == api.post("/v1/score", json=score_body()).json()
+
+    def test_the_table_shows_every_criterion_and_what_was_noted(self, run: Run, tmp_path: Path) -> None:
+        file = tmp_path / "impact.json"
+        file.write_text(json.dumps(impact_body("e-1", scale=0.05)))
+        code, printed, _ = run("score", str(file))
+        assert code == 0
+        for words in ("Brain angle metric", "Head injury criterion, 15 ms", "Research use only", "bam at sensitivity"):
+            assert words in printed
+
+    def test_several_impacts_are_a_list_and_a_bad_one_is_said_on_standard_error(self, run: Run, tmp_path: Path) -> None:
+        file = tmp_path / "impacts.ndjson"
+        bad = impact_body("bad")
+        del bad["kinematics"]["linear_acceleration"]["unit"]
+        file.write_text("\n".join(json.dumps(body) for body in (impact_body("e-0"), bad, impact_body("e-2"))))
+        code, printed, failed = run("score", str(file), "--json")
+        assert code == 2
+        assert len(json.loads(printed)) == 2
+        assert failed.startswith("headimpact: impact 1: ")
+        assert "/kinematics/linear_acceleration/unit" in failed
+
+    def test_a_table_without_times_needs_its_rate(self, run: Run, tmp_path: Path) -> None:
+        file = tmp_path / "swa.csv"
+        rows = [f"d,37:10.6,s,p,m,i,{i},{x},1.0,0.5" for i, x in enumerate([0, 5, 40, 55, 30, 8, 1, 0, 0, 0])]
+        file.write_text(SWA + "\n".join(rows))
+        given = ("score", str(file), "--preset", "swa", "--json", "--occurred-at", "2026-11-20T19:04:05Z")
+        assert run(*given)[0] == 2
+        code, printed, failed = run(*given, "--sample-rate-hz", "1000")
+        assert code == 0, failed
+        assert json.loads(printed)["peaks"]["linear_acceleration_g"] > 20
+
+    def test_a_mapping_may_be_in_a_file(self, run: Run) -> None:
+        examples = Path(__file__).parents[3] / "openapi" / "examples"
+        table, mapping = examples / "import.csv", examples / "mapping.json"
+        code, printed, _ = run("score", str(table), "--mapping", f"@{mapping}", "--json")
+        assert code == 0
+        assert json.loads(printed)["peaks"]["linear_acceleration_g"] > 40
+
+    @pytest.mark.parametrize("text", [None, "", "nonsense", "{", "[]"])
+    def test_a_file_that_cannot_be_read_is_one_line_and_exit_code_2(
+        self, run: Run, tmp_path: Path, text: str | None
+    ) -> None:
+        file = tmp_path / "file.json"
+        if text is not None:
+            file.write_text(text)
+        code, printed, failed = run("score", str(file))
+        assert (code, printed, len(failed.splitlines())) == (2, "", 1)
+        assert "Traceback" not in failed
+
+    def test_standard_input_is_read_for_a_dash(self, tmp_path: Path) -> None:
+        command = [sys.executable, "-m", "headimpact_service", "score", "-", "--json"]
+        given = json.dumps(impact_body()).encode()
+        ended = subprocess.run(command, input=given, cwd=tmp_path, capture_output=True, check=True)
+        assert json.loads(ended.stdout)["state"] == "scored"
+
+
+class TestOthers:
+    def test_migrate_makes_the_database_and_may_be_run_again(self, run: Run, tmp_path: Path) -> None:
+        for _ in range(2):
+            code, printed, _ = run("migrate")
+            assert (code, "headimpact.db" in printed) == (0, True)
+        assert (tmp_path / "headimpact.db").exists()
+
+    def test_openapi_writes_the_document_and_the_list_of_problems(self, run: Run, tmp_path: Path) -> None:
+        assert run("openapi", "--output", "a.json", "--problems", "p.md")[0] == 0
+        assert json.loads((tmp_path / "a.json").read_text("utf-8")) == document()
+        assert (tmp_path / "p.md").read_text("utf-8") == as_markdown()
+
+    def test_help_names_every_command(self, run: Run) -> None:
+        code, printed, _ = run("--help")
+        assert code == 0
+        for command in ("serve", "migrate", "keys", "score", "openapi"):
+            assert command in printed
+
+    @pytest.mark.parametrize(
+        ("name", "value"),
+        [
+            ("HEADIMPACT_DATABASE_URL", "sqlite:///:memory:"),
+            ("HEADIMPACT_DATABASE_URL", "x"),
+            ("HEADIMPACT_PORT", "no"),
+        ],
+    )
+    def test_a_setting_that_cannot_work_is_one_line_and_exit_code_2(
+        self, run: Run, monkeypatch: pytest.MonkeyPatch, name: str, value: str
+    ) -> None:
+        monkeypatch.setenv(name, value)
+        code, _, failed = run("migrate")
+        assert (code, len(failed.splitlines())) == (2, 1)
+
+    def test_a_fault_of_our_own_is_one_line_and_exit_code_1(self, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+        def fail(*_: object) -> None:
+            raise RuntimeError("broken")
+
+        monkeypatch.setattr("headimpact_service.cli.database.migrate", fail)
+        assert run("migrate") == (1, "", "headimpact: RuntimeError: broken\n")
