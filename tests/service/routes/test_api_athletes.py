@@ -54,7 +54,6 @@ class TestCreate:
         answer = api.post("/v1/athletes", json={field: value})
         assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, f"/{field}")
 
-
     def test_an_unknown_zone_is_refused_in_words(self, api: Api) -> None:
         answer = api.post("/v1/athletes", json={"time_zone": "Mars/Base"})
         assert "IANA" in answer.json()["errors"][0]["detail"]
