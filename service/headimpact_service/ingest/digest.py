@@ -81,7 +81,8 @@ def _named(hexadecimal: str) -> str:
 
 def _members(recording: Recording, needs_device_mounting: bool) -> dict[str, Any]:
     low_pass = recording.low_pass
-    return {
+    filled = {"fill_gaps": True} if recording.fill_gaps else {}
+    return filled | {
         "version": VERSION,
         "axes": recording.axes,
         "location": "device" if needs_device_mounting else None,
@@ -94,7 +95,8 @@ def _members(recording: Recording, needs_device_mounting: bool) -> dict[str, Any
 
 def _mounting(mounting: Mounting) -> list[Any]:
     parts = (mounting.accelerometer_rotation, mounting.gyroscope_rotation, mounting.offset_m)
-    return [(np.asarray(part, dtype=np.float64) + 0.0).tolist() for part in parts]
+    delays = [mounting.accelerometer_delay_s, mounting.gyroscope_delay_s]
+    return [(np.asarray(part, dtype=np.float64) + 0.0).tolist() for part in parts] + (delays if any(delays) else [])
 
 
 def _number(cut_off: float | str | None) -> float | str | None:

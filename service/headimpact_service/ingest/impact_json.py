@@ -25,6 +25,8 @@ Text = Annotated[str, Field(min_length=1, max_length=2000, pattern=PRINTABLE)]
 Word = Annotated[str, Field(min_length=1, max_length=64, pattern=PRINTABLE)]
 # The first bad sample ends a list's validation: a list of 20 000 strings would cost a megabyte of errors a thousand.
 Samples = Annotated[list[float], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES, fail_fast=True)]
+# Null is a missing sample, which is taken only where it is to be filled or the record is not to be scored.
+Components = Annotated[list[float | None], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES, fail_fast=True)]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -86,6 +88,9 @@ class Context(Strict):
     trigger_threshold_g: float | None = Field(None, ge=0, description="Acceleration that starts a record [g].")
     post_trigger_ms: float | None = Field(None, ge=0, description="Recorded time after the trigger [ms].")
     on_board_filter: Text | None = Field(None, description="Filtering done before the data left the device.")
+    level: Word | None = Field(None, description="Level of play, where no athlete says it.", examples=["collegiate"])
+    sex: Literal["male", "female", "other"] | None = Field(None, description="Of the person, where no athlete says it.")
+    age_years: float | None = Field(None, ge=0, le=120, description="Of the person at the time, likewise.")
 
 
 class SignalBody(Strict):
@@ -97,13 +102,17 @@ class SignalBody(Strict):
     time_ms: Samples | None = Field(
         None, description="One stamp per sample [ms], strictly increasing.", examples=[[0.0, 1.0, 2.0]]
     )
-    x: Samples | None = Field(
+    x: Components | None = Field(
         None,
         description="Samples along (or about) x, forward. Null only outside a constrained plane.",
         examples=[[0.1, 3.2, 0.4]],
     )
-    y: Samples | None = Field(None, description="Samples along (or about) y.", examples=[[0.0, -1.1, 0.2]])
-    z: Samples | None = Field(None, description="Samples along (or about) z.", examples=[[0.9, 7.5, 1.2]])
+    y: Components | None = Field(None, description="Samples along (or about) y.", examples=[[0.0, -1.1, 0.2]])
+    z: Components | None = Field(None, description="Samples along (or about) z.", examples=[[0.9, 7.5, 1.2]])
+    range: float | None = Field(None, gt=0, description="Full scale of the sensor, in `unit`: tells clipping.")
+    peak_resultant: float | None = Field(
+        None, ge=0, description="The peak that the device itself reports, in `unit`: checked against the samples."
+    )
 
 
 class LinearAccelerationBody(SignalBody):
@@ -124,6 +133,17 @@ class AngularAccelerationBody(SignalBody):
     unit: Literal["rad/s^2", "deg/s^2"] = Field(description="Required: units are never guessed.")
 
 
+Delay = Annotated[
+    float,
+    Field(
+        ge=-1000.0,
+        le=1000.0,
+        description="How much later than the motion its samples are stamped [ms]; shown where it is not zero.",
+        exclude_if=lambda delay: delay == 0.0,
+    ),
+]
+
+
 class AccelerometerMounting(Strict):
     """How the accelerometer sits on the head."""
 
@@ -134,6 +154,7 @@ class AccelerometerMounting(Strict):
     offset_mm: Vector = Field(
         description="Its position from the head's centre of gravity, in head axes [mm].", examples=[[70.0, 0.0, -60.0]]
     )
+    delay_ms: Delay = 0.0
 
 
 class GyroscopeMounting(Strict):
@@ -143,6 +164,7 @@ class GyroscopeMounting(Strict):
         description="Sensor axes to head axes: orthonormal with determinant +1 within 1e-3.",
         examples=[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]],
     )
+    delay_ms: Delay = 0.0
 
 
 class MountingBody(Strict):
@@ -150,7 +172,7 @@ class MountingBody(Strict):
 
     accelerometer: AccelerometerMounting
     gyroscope: GyroscopeMounting | None = Field(
-        None, description="Left out where it shares the accelerometer's axes, as in one chip."
+        None, description="Left out where it shares the accelerometer's axes and delay, as in one chip."
     )
 
 
@@ -206,6 +228,9 @@ class Kinematics(Strict):
         None, ge=0.0, le=60_000.0, description="From the first sample to the trigger [ms].", examples=[10]
     )
     filter: Filter = Field("paper", description="`paper` is 300 Hz on acceleration and 184 Hz on angular velocity.")
+    fill_gaps: bool = Field(
+        default=False, description="Fill gaps of at most 2 samples: null among them, or missing between the stamps."
+    )
     linear_acceleration: LinearAccelerationBody | None = None
     angular_velocity: AngularVelocityBody | None = None
     angular_acceleration: AngularAccelerationBody | None = None
@@ -246,13 +271,22 @@ class ScoreBody(Strict):
     )
 
 
+Reasons = Annotated[list[Text], Field(min_length=1, max_length=20)]
+
+
 class FileImpactBody(ScoreBody):
     """An impact in a file: its athlete may come with the upload instead."""
 
     athlete: AthleteRef | None = None
+    unscorable: Reasons | None = Field(None, description="Why the record is to be stored without a score.")
 
 
 class ImpactBody(ScoreBody):
     """An impact to be scored and stored."""
 
     athlete: AthleteRef
+    unscorable: Reasons | None = Field(
+        None,
+        description="Why the record is to be stored without a score, such as a channel that its laboratory disowns.",
+        examples=[None],
+    )

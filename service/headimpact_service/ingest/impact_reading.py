@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import isnan
 from typing import Any, TypeVar
 
 import numpy as np
 
 from headimpact.errors import TraceError
 from headimpact.filtering import NO_FILTER, PAPER, LowPass
+from headimpact.quality import QualityNote, check_reported_peak
 from headimpact.recording import AXES, Mounting, Recording, Signal, require_proper_rotation
 from headimpact.risk import OperatingPointRequest
-from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 from headimpact_service.ingest import impact_rules
 from headimpact_service.ingest.impact_json import (
     AthleteRef,
@@ -45,9 +48,13 @@ def to_record(body: ScoreBody, *, time_zone: str | None = None, what: str = "bod
     if broken:
         raise rules_problem(broken, what=what)
     athlete: AthleteRef | None = getattr(body, "athlete", None)
+    unscorable: list[str] | None = getattr(body, "unscorable", None)
     kinematics = body.kinematics
+    sent = recording(kinematics)
+    if not kinematics.fill_gaps and unscorable is None:
+        _require_whole(sent, what)
     return ImpactRecord(
-        recording=recording(kinematics),
+        recording=sent,
         external_id=body.external_id,
         athlete_id=None if athlete is None else athlete.id,
         athlete_external_id=None if athlete is None else athlete.external_id,
@@ -55,6 +62,8 @@ def to_record(body: ScoreBody, *, time_zone: str | None = None, what: str = "bod
         device_serial=None if body.device is None else body.device.serial,
         context={} if body.context is None else body.context.model_dump(exclude_none=True),
         metadata={"format": "json"},
+        notes=tuple(_reported(kinematics, sent)),
+        unscorable=tuple(unscorable or ()),
         needs_device_mounting=kinematics.location == "sensor" and kinematics.mounting is None,
         operating_points=_operating_points(body),
         include=tuple(body.include or ()),
@@ -74,7 +83,29 @@ def recording(kinematics: Kinematics) -> Recording:
         constrained_plane=kinematics.constrained_plane,
         low_pass=low_pass(kinematics.filter),
         pre_trigger_ms=kinematics.pre_trigger_ms,
+        fill_gaps=kinematics.fill_gaps,
     )
+
+
+def _require_whole(sent: Recording, what: str) -> None:
+    """Refuse null among samples: every one of them, up to the number of errors that an answer holds."""
+    errors: list[PayloadError] = []
+    for name, signal in sent.signals():
+        # One sum is half the cost of looking at every sample.
+        if isnan(signal.values.sum()):
+            for axis, index in np.argwhere(np.isnan(signal.values.T)).tolist():
+                place = f"/kinematics/{name}/{AXES[axis]}/{index}"
+                errors.append(PayloadError(detail="A number is needed.", code="wrong-type", pointer=place))
+    if errors:
+        raise rules_problem(errors[:MAX_ERRORS], what=what, count=len(errors))
+
+
+def _reported(kinematics: Kinematics, sent: Recording) -> Iterator[QualityNote]:
+    """Where the device's own peaks are not those of its samples."""
+    for name, signal in sent.signals():
+        reported: float | None = getattr(kinematics, name).peak_resultant
+        if reported is not None:
+            yield from check_reported_peak(name, signal.unit, reported, signal.values)
 
 
 def low_pass(choice: str | FilterBody) -> LowPass:
@@ -93,6 +124,8 @@ def mounting(body: MountingBody, place: str = "/kinematics/mounting") -> Mountin
         accelerometer_rotation=np.array(body.accelerometer.rotation),
         gyroscope_rotation=np.array(gyroscope.rotation),
         offset_m=np.array(body.accelerometer.offset_mm) / 1000.0,
+        accelerometer_delay_s=body.accelerometer.delay_ms / 1000.0,
+        gyroscope_delay_s=gyroscope.delay_ms / 1000.0,
     )
 
 
@@ -116,12 +149,12 @@ def _signal(body: Any, *, uniform: bool) -> Signal | None:  # noqa: ANN401 - one
         return None
     values = _samples(body)
     if body.time_ms is None:
-        return Signal(values=values, unit=body.unit, sample_rate_hz=body.sample_rate_hz)
+        return Signal(values=values, unit=body.unit, sample_rate_hz=body.sample_rate_hz, declared_range=body.range)
     stamps_s = np.array(body.time_ms) / 1000.0
     rate = nominal_rate(stamps_s) if uniform else None
     if rate is not None:
-        return Signal(values=values, unit=body.unit, sample_rate_hz=rate)
-    return Signal(values=values, unit=body.unit, time_s=stamps_s)
+        return Signal(values=values, unit=body.unit, sample_rate_hz=rate, declared_range=body.range)
+    return Signal(values=values, unit=body.unit, time_s=stamps_s, declared_range=body.range)
 
 
 def _samples(body: SignalBody) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -7,20 +7,13 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
-from headimpact.quality import QualityNote
+from headimpact.quality import QualityNote, population_reason
 from headimpact_service.ingest.impact_json import MountingBody
 from headimpact_service.ingest.impact_reading import mounting
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.scoring import UNKNOWN_DEVICE, DeviceFacts
 from headimpact_service.store import athletes, devices, ids
 from headimpact_service.store.athletes import Athlete
-
-ADULT = 18
-OUTSIDE_POPULATION = QualityNote(
-    "outside_model_population",
-    "note",
-    "The published model rests on adult men; this athlete is outside them, so its probabilities are extrapolated.",
-)
 
 Found = tuple[DeviceFacts, Athlete | None]
 
@@ -65,15 +58,28 @@ def _device(device: devices.Device | None) -> DeviceFacts:
 
 
 def with_population_note(record: ImpactRecord, athlete: Athlete | None) -> ImpactRecord:
-    """The record, with a note if its athlete is none of those that the published model rests on."""
-    if athlete is None or not _outside(record, athlete):
+    """The record, with a note if its athlete is none of those that the published model rests on.
+
+    What is stored of the athlete is asked first; what it does not say, the impact's context may.
+    """
+    context = record.context
+    reason = population_reason(
+        (athlete and athlete.sex) or context.get("sex"),
+        _age_years(record, athlete),
+        (athlete and athlete.level) or context.get("level"),
+    )
+    if reason is None:
         return record
-    return replace(record, notes=(*record.notes, OUTSIDE_POPULATION))
+    detail = (
+        f"The published model rests on adult men; this athlete is outside them ({reason}), so its probabilities are "
+        "extrapolated."
+    )
+    return replace(record, notes=(*record.notes, QualityNote("outside_model_population", "note", detail)))
 
 
-def _outside(record: ImpactRecord, athlete: Athlete) -> bool:
-    if athlete.sex is not None and athlete.sex != "male":
-        return True
-    if athlete.birth_year is None or record.occurred_at is None:
-        return False
-    return record.occurred_at.year - athlete.birth_year < ADULT
+def _age_years(record: ImpactRecord, athlete: Athlete | None) -> float | None:
+    """The age at the impact, of a birth year at most: a year's last birthday counts."""
+    if athlete is not None and athlete.birth_year is not None and record.occurred_at is not None:
+        return float(record.occurred_at.year - athlete.birth_year)
+    age_years: float | None = record.context.get("age_years")
+    return age_years

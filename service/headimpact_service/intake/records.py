@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from math import inf, nextafter
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ def describe(record: ImpactRecord) -> dict[str, Any]:
             "linear_acceleration": recording.low_pass.linear_acceleration,
             "angular_velocity": recording.low_pass.angular_velocity,
         },
+        "fill_gaps": recording.fill_gaps,
         "signals": {name: _signal(signal) for name, signal in recording.signals()},
         "metadata": dict(record.metadata),
         "unscorable": list(record.unscorable),
@@ -53,6 +55,8 @@ def _mounting(mounting: Mounting) -> dict[str, Any]:
         "accelerometer_rotation": mounting.accelerometer_rotation.tolist(),
         "gyroscope_rotation": mounting.gyroscope_rotation.tolist(),
         "offset_m": mounting.offset_m.tolist(),
+        "accelerometer_delay_s": mounting.accelerometer_delay_s,
+        "gyroscope_delay_s": mounting.gyroscope_delay_s,
     }
 
 
@@ -83,11 +87,20 @@ def rebuild(document: Mapping[str, Any], samples: Mapping[str, FloatArray]) -> R
     return Recording(
         **{name: _rebuilt(name, document["signals"].get(name), samples) for name in SIGNALS},
         axes=document["axes"],
-        mounting=None if mounting is None else Mounting(**{name: np.array(part) for name, part in mounting.items()}),
+        mounting=None if mounting is None else _rebuilt_mounting(mounting),
         constrained_plane=document["constrained_plane"],
         low_pass=LowPass(**document["low_pass"]),
         pre_trigger_ms=document["pre_trigger_ms"],
+        fill_gaps=document.get("fill_gaps", False),
     )
+
+
+def _rebuilt_mounting(mounting: Mapping[str, Any]) -> Mounting:
+    """A mounting; one that was stored before sensors could lag names no delays."""
+    parts: dict[str, Any] = {
+        name: np.array(part) if isinstance(part, list) else part for name, part in mounting.items()
+    }
+    return Mounting(**parts)
 
 
 def _rebuilt(name: str, described: Mapping[str, Any] | None, samples: Mapping[str, FloatArray]) -> Signal | None:
@@ -112,6 +125,7 @@ def kinematics_document(document: Mapping[str, Any]) -> dict[str, Any]:
         "filter": _filter(document["low_pass"]),
         "constrained_plane": document["constrained_plane"],
         "mounting": None if mounting is None else mounting_document(mounting),
+        "fill_gaps": document.get("fill_gaps", False),
     }
     for name in SIGNALS:
         described = document["signals"].get(name)
@@ -128,11 +142,25 @@ def _filter(low_pass: Mapping[str, Any]) -> Any:  # noqa: ANN401 - a name or an 
 
 def mounting_document(mounting: Mapping[str, Any]) -> dict[str, Any]:
     """A mounting as requests write it."""
-    offset_mm = [round(metres * 1000.0, 9) for metres in mounting["offset_m"]]
-    return {
+    offset_mm = [thousandfold(metres) for metres in mounting["offset_m"]]
+    delays = {name: thousandfold(mounting.get(f"{name}_delay_s", 0.0)) for name in ("accelerometer", "gyroscope")}
+    shown: dict[str, Any] = {
         "accelerometer": {"rotation": mounting["accelerometer_rotation"], "offset_mm": offset_mm},
         "gyroscope": {"rotation": mounting["gyroscope_rotation"]},
     }
+    for name, delay_ms in delays.items():
+        if delay_ms:
+            shown[name]["delay_ms"] = delay_ms
+    return shown
+
+
+def thousandfold(value: float) -> float:
+    """The number that, divided by 1000, gives `value` again: milli-units, as they were sent; the shortest of them."""
+    exact = value * 1000.0
+    for candidate in (round(exact, 9), exact, nextafter(exact, inf), nextafter(exact, -inf)):
+        if candidate / 1000.0 == value:
+            return candidate
+    return exact
 
 
 def raw_traces(document: Mapping[str, Any], samples: Mapping[str, FloatArray]) -> dict[str, Any]:
@@ -145,7 +173,7 @@ def raw_traces(document: Mapping[str, Any], samples: Mapping[str, FloatArray]) -
 
 def _raw(name: str, described: Mapping[str, Any], samples: Mapping[str, FloatArray]) -> dict[str, Any]:
     stamps = samples.get(name + _TIME)
-    time_ms = None if stamps is None else (stamps * 1000.0).tolist()
+    time_ms = None if stamps is None else [thousandfold(stamp) for stamp in stamps.tolist()]
     rate = {"sample_rate_hz": described["sample_rate_hz"], "time_ms": time_ms}
     return {"unit": described["unit"], **rate, **axes_lists(samples[name])}
 

@@ -48,7 +48,7 @@ def new_score(scored: Scored) -> NewScore:
 def _unscorable(scored: Scored) -> NewScore:
     reason = " ".join(scored.reasons)
     details: dict[str, Any] = {
-        "quality": [_note(note) for note in scored.record.notes],
+        "quality": [note_document(note) for note in scored.record.notes],
         "reasons": list(scored.reasons),
         "missing": {key: reason for key, _ in _UNITS},
         "operating_points": [_operating_point(point, None) for point in scored.points],
@@ -69,7 +69,7 @@ def _details(scored: Scored, score: ImpactScore, quality: Iterable[QualityNote])
     """What has no column, as JSON reads it back: only what there is, so that an ordinary score is a short document."""
     criteria = score.criteria
     details: dict[str, Any] = {
-        "quality": [_note(note) for note in quality],
+        "quality": [note_document(note) for note in quality],
         "windows_ms": {key: list(found.window_ms) for key, found in criteria.items() if found.window_ms is not None},
         "operating_points": [_operating_point(point, score) for point in scored.points],
     }
@@ -83,7 +83,8 @@ def _details(scored: Scored, score: ImpactScore, quality: Iterable[QualityNote])
     return details
 
 
-def _note(note: QualityNote) -> dict[str, Any]:
+def note_document(note: QualityNote) -> dict[str, Any]:
+    """A note as it is answered."""
     shown = {"code": note.code, "severity": note.severity, "detail": note.detail}
     if note.signal is not None:
         shown["signal"] = note.signal

@@ -133,14 +133,18 @@ def digest_bytes(text: str) -> bytes:
 
 
 def with_device(record: ImpactRecord, device: DeviceFacts) -> ImpactRecord:
-    """The record with what its device's page adds: the mounting where it needs one, the ranges where it has none."""
+    """The record with what its context and its device's page add: the ranges and the mounting where it has none."""
     recording = record.recording
     if record.needs_device_mounting:
         if device.mounting is None:
             raise mounting_missing()
         recording = replace(recording, mounting=device.mounting)
-    if device is not UNKNOWN_DEVICE:
-        recording = _with_ranges(recording, device)
+    context = record.context
+    recording = _with_ranges(
+        recording,
+        context.get("linear_acceleration_range_g") or device.linear_acceleration_range_g,
+        context.get("angular_velocity_range_rad_s") or device.angular_velocity_range_rad_s,
+    )
     return (
         record if recording is record.recording else replace(record, recording=recording, needs_device_mounting=False)
     )
@@ -153,9 +157,11 @@ def mounting_missing() -> Problem:
     return Problem("mounting-missing", detail, errors=[error])
 
 
-def _with_ranges(recording: Recording, device: DeviceFacts) -> Recording:
-    linear = _with_range(recording.linear_acceleration, device.linear_acceleration_range_g, "g")
-    angular = _with_range(recording.angular_velocity, device.angular_velocity_range_rad_s, "rad/s")
+def _with_ranges(recording: Recording, range_g: float | None, range_rad_s: float | None) -> Recording:
+    linear = _with_range(recording.linear_acceleration, range_g, "g")
+    angular = _with_range(recording.angular_velocity, range_rad_s, "rad/s")
+    if linear is recording.linear_acceleration and angular is recording.angular_velocity:
+        return recording
     return replace(recording, linear_acceleration=linear, angular_velocity=angular)
 
 

@@ -34,8 +34,11 @@ routes = Routes("impacts")
 
 
 class RawTraceView(TraceView):
-    """A signal as it was sent."""
+    """A signal as it was sent; null where a sample is missing."""
 
+    x: list[float | None]  # type: ignore[assignment] # what was scored has no such samples
+    y: list[float | None]  # type: ignore[assignment]
+    z: list[float | None]  # type: ignore[assignment]
     sample_rate_hz: float | None
     time_ms: list[float] | None
 

@@ -7,17 +7,17 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from headimpact.quality import QualityNote
 from headimpact_service.ingest.impact_json import Filter, MountingBody
 from headimpact_service.intake.records import kinematics_document
-from headimpact_service.intake.rendering import score_document
+from headimpact_service.intake.rendering import note_document, score_document
 from headimpact_service.routes.lists import Cell
 from headimpact_service.routes.score_shapes import ScoreView, Shape
 from headimpact_service.store import ids
+from headimpact_service.store.impact_lists import DUPLICATE
 from headimpact_service.store.impact_rows import Impact
 from headimpact_service.store.score_rows import Score
 from headimpact_service.store.tables import CRITERION_COLUMNS, PROBABILITY_COLUMNS, VALUE_COLUMNS
-
-DUPLICATE = "duplicate_content"
 
 
 class AthleteOfImpact(Shape):
@@ -50,6 +50,7 @@ class KinematicsView(Shape):
     filter: Filter
     constrained_plane: Literal["sagittal", "coronal", "axial"] | None
     mounting: MountingBody | None = Field(description="The one that was used: the request's own, or the device's.")
+    fill_gaps: bool = Field(description="Whether gaps of at most 2 samples were to be filled.")
     linear_acceleration: SignalView | None
     angular_velocity: SignalView | None
     angular_acceleration: SignalView | None
@@ -135,8 +136,8 @@ def _score(impact: Impact, score: Score) -> dict[str, Any]:
     document = score_document(score)
     if impact.duplicate_of is not None:
         detail = f"The same signals came before as {ids.encode('imp', impact.duplicate_of)}."
-        note = {"code": DUPLICATE, "severity": "note", "detail": detail}
-        document["quality"] = [*document["quality"], note]
+        note = QualityNote("duplicate_content", "note", detail)
+        document["quality"] = [*document["quality"], note_document(note)]
     return document
 
 

@@ -79,7 +79,7 @@ class ImpactQuery(SyncQuery):
     session_id: Text = Field(None, description="Of this session.")
     occurred_from: Annotated[Instant | None, Field(description="At this time or later.")] = None
     occurred_to: Annotated[Instant | None, Field(description="Before this time.")] = None
-    quality_code: Annotated[str | None, Field(pattern=r"^[a-z_]{1,64}$", description="With this quality note.")] = None
+    quality: Annotated[str | None, Field(pattern=r"^[a-z_]{1,64}$", description="With this quality note.")] = None
     criterion: Annotated[CriterionKey | None, Field(description="The one that `min_probability` is about.")] = None
     min_probability: Annotated[
         Probability | None, Field(description="Where `criterion` gives at least this probability.")
@@ -124,7 +124,7 @@ def _filters(query: ImpactQuery) -> ImpactFilters:
         session_id=query.session_id,
         occurred_from=query.occurred_from,
         occurred_to=query.occurred_to,
-        quality_code=query.quality_code,
+        quality_code=query.quality,
         min_probability=probability,
     )
 

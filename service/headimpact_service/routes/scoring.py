@@ -12,6 +12,7 @@ from headimpact_service.answers import answer
 from headimpact_service.ingest.impact_json import ScoreBody
 from headimpact_service.ingest.impact_reading import to_record
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.intake.facts import with_population_note
 from headimpact_service.intake.rendering import new_score, score_document, scored_traces
 from headimpact_service.intake.scoring import UNKNOWN_DEVICE, DeviceFacts, Scored, Terms, score_record
 from headimpact_service.operation import Answer, Call, Routes
@@ -52,9 +53,9 @@ async def score(call: Call, record: ImpactRecord) -> Scored:
 
 
 async def facts_of(call: Call, record: ImpactRecord) -> tuple[DeviceFacts, ImpactRecord]:
-    """What the record's device and athlete add to it."""
+    """What the record's device, athlete and context add to it."""
     if record.device_serial is None and record.athlete_id is None and record.athlete_external_id is None:
-        return UNKNOWN_DEVICE, record
+        return UNKNOWN_DEVICE, with_population_note(record, None)
     found: tuple[DeviceFacts, ImpactRecord] = await call.request.app.state.facts.of(call, record)
     return found
 

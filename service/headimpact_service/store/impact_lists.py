@@ -13,6 +13,9 @@ from headimpact_service.store.paging import Page, Position, keyset, page_of
 from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.tables import devices, impact_revisions, impacts, scores
 
+DUPLICATE = "duplicate_content"
+"""The note of an impact whose signals came before: what it says is `duplicate_of`."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImpactFilters:
@@ -126,11 +129,18 @@ def _conditions(filters: ImpactFilters) -> list[ColumnElement[bool]]:
     if filters.occurred_to is not None:
         conditions.append(impacts.c.occurred_at < filters.occurred_to)
     if filters.quality_code is not None:
-        conditions.append(scores.c.quality_codes.contains(f" {filters.quality_code} ", autoescape=True))
+        conditions.append(_noted(filters.quality_code))
     if filters.min_probability is not None:
         criterion, least = filters.min_probability
         conditions.append(scores.c[f"{criterion}_probability"] >= least)
     return conditions
+
+
+def _noted(code: str) -> ColumnElement[bool]:
+    """Whether a note is one of the present score's; that of a duplicate is the impact's own."""
+    if code == DUPLICATE:
+        return impacts.c.duplicate_of.is_not(None)
+    return scores.c.quality_codes.contains(f" {code} ", autoescape=True)
 
 
 def revisions(conn: Connection, data_set_id: bytes, impact_id: bytes) -> list[Revision]:
