@@ -20,10 +20,19 @@ from sending import impact_body
 
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[Service]:
-    running = Service(tmp_path, {"HEADIMPACT_HEAD_TIMEOUT_S": "0.5", "HEADIMPACT_BODY_TIMEOUT_S": "0.5"})
+    running = Service(tmp_path)
     yield running
     if running.process.poll() is None:
         running.stop()
+
+
+@pytest.fixture(scope="module")
+def impatient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """One service for all stalling clients: a start costs seconds."""
+    timeouts = {"HEADIMPACT_HEAD_TIMEOUT_S": "0.5", "HEADIMPACT_BODY_TIMEOUT_S": "0.5"}
+    running = Service(tmp_path_factory.mktemp("impatient"), timeouts)
+    yield running
+    running.stop()
 
 
 class TestFirstStart:
@@ -65,38 +74,38 @@ class TestFirstStart:
 
 
 class TestStalledClients:
-    def test_a_head_that_does_not_come_closes_the_connection(self, service: Service) -> None:
+    def test_a_head_that_does_not_come_closes_the_connection(self, impatient: Service) -> None:
         for begun in (b"", b"GET /livez HTTP/1.1\r\nHost: x\r\n"):
-            with socket.create_connection(("127.0.0.1", service.port), timeout=10) as connection:
+            with socket.create_connection(("127.0.0.1", impatient.port), timeout=10) as connection:
                 connection.sendall(begun)
                 assert connection.recv(1000) == b""
 
-    def test_a_body_that_stops_is_408(self, service: Service) -> None:
+    def test_a_body_that_stops_is_408(self, impatient: Service) -> None:
         head = (
-            f"POST /v1/score HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {service.key}\r\n"
+            f"POST /v1/score HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {impatient.key}\r\n"
             'Content-Type: application/json\r\nContent-Length: 1000\r\n\r\n{"kinematics"'
         )
-        with socket.create_connection(("127.0.0.1", service.port), timeout=10) as connection:
+        with socket.create_connection(("127.0.0.1", impatient.port), timeout=10) as connection:
             connection.sendall(head.encode())
             answer = received(connection)
         assert answer.startswith(b"HTTP/1.1 408 ")
         assert b"/problems/request-timeout" in answer
 
-    def test_the_rest_of_a_refused_body_is_not_waited_for_for_ever(self, service: Service) -> None:
+    def test_the_rest_of_a_refused_body_is_not_waited_for_for_ever(self, impatient: Service) -> None:
         head = b"POST /v1/score HTTP/1.1\r\nHost: x\r\nContent-Length: 100000\r\n\r\nx"
-        with socket.create_connection(("127.0.0.1", service.port), timeout=10) as connection:
+        with socket.create_connection(("127.0.0.1", impatient.port), timeout=10) as connection:
             connection.sendall(head)
             assert received(connection).startswith(b"HTTP/1.1 401 ")
 
-    def test_what_is_no_http_is_a_problem_too(self, service: Service) -> None:
-        with socket.create_connection(("127.0.0.1", service.port), timeout=10) as connection:
+    def test_what_is_no_http_is_a_problem_too(self, impatient: Service) -> None:
+        with socket.create_connection(("127.0.0.1", impatient.port), timeout=10) as connection:
             connection.sendall(b"nonsense\r\n\r\n")
             answer = received(connection)
         assert answer.startswith(b"HTTP/1.1 400 ")
         assert b"application/problem+json" in answer
 
-    def test_a_body_that_is_too_large_is_answered_although_it_is_still_being_sent(self, service: Service) -> None:
-        with service.client(service.key) as client:
+    def test_a_body_that_is_too_large_is_answered_although_it_is_still_being_sent(self, impatient: Service) -> None:
+        with impatient.client(impatient.key) as client:
             headers = {"Content-Type": "application/json"}
             for size in (8 * 1024 * 1024 + 1, 40_000_000):
                 assert client.post("/v1/score", content=b" " * size, headers=headers).status_code == 413
