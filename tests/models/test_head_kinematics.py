@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from waveforms import burst, rotation_matrix
 
 from headimpact.filtering import NO_FILTER
-from headimpact.kinematics import STANDARD_GRAVITY, differentiate, running_integral, transfer_to_head_cg
+from headimpact.kinematics import STANDARD_GRAVITY, HeadKinematics, differentiate, running_integral, transfer_to_head_cg
 from headimpact.preparation import prepare
 from headimpact.recording import Mounting, Recording, Signal
 
@@ -196,3 +196,10 @@ def test_supplied_angular_acceleration_is_turned_with_the_gyroscope():
         angular_acceleration=Signal(alpha, "rad/s^2", 1000.0), mounting=Mounting(to_head_a, to_head_w, np.zeros(3))
     )
     np.testing.assert_allclose(prepare(recording).kinematics.angular_acceleration, alpha @ to_head_w.T, rtol=1e-12)
+
+
+def test_kinematics_without_a_signal_have_no_samples_and_say_what_is_missing():
+    empty = HeadKinematics(1000.0, None, None, None)
+    assert empty.samples == 0
+    with pytest.raises(ValueError, match="linear_acceleration"):
+        _ = empty.linear_acceleration_squared
