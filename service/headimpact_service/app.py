@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+from anyio.to_thread import run_sync
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
@@ -24,6 +25,7 @@ from headimpact_service.routes import (
     impact_parts,
     impacts,
     imports,
+    jobs,
     keys,
     models,
     scoring,
@@ -39,6 +41,7 @@ _MODULES = (
     impacts,
     impact_parts,
     imports,
+    jobs,
     athletes,
     devices,
     models,
@@ -55,6 +58,7 @@ OPERATIONS: tuple[Operation, ...] = tuple(
         impacts,
         impact_parts,
         imports,
+        jobs,
         athletes,
         devices,
         models,
@@ -68,8 +72,8 @@ OPERATIONS: tuple[Operation, ...] = tuple(
 )
 
 
-def create_app(configured: Settings, database: Database) -> Starlette:
-    """The application on a migrated database, which it closes when the server stops it."""
+def create_app(configured: Settings, database: Database, engine: deps.JobEngine | None = None) -> Starlette:
+    """The application on a migrated database; it runs the engine, and closes both when the server stops it."""
     app = Starlette(
         routes=resources(OPERATIONS),
         middleware=[Middleware(Edge, access_log=configured.access_log)],
@@ -77,7 +81,7 @@ def create_app(configured: Settings, database: Database) -> Starlette:
         lifespan=_lifespan,
     )
     app.router.redirect_slashes = False  # /v1/impacts/ is another path, and nothing is there
-    deps.set_up(app, configured, database)
+    deps.set_up(app, configured, database, engine)
     app.state.facts = Facts()
     app.state.openapi = openapi.as_text(openapi.document(OPERATIONS)).encode()
     return app
@@ -85,7 +89,9 @@ def create_app(configured: Settings, database: Database) -> Starlette:
 
 @asynccontextmanager
 async def _lifespan(app: Starlette) -> AsyncIterator[None]:
+    app.state.engine.start()
     yield
+    await run_sync(app.state.engine.stop)
     app.state.database.close()  # what is queued is written first: its senders were promised an answer
 
 

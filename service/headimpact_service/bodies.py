@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import zlib
-from collections.abc import Iterable
+from collections.abc import AsyncGenerator, Iterable, Iterator
 from typing import TypeVar
 
 from pydantic import BaseModel
@@ -22,6 +22,7 @@ SLOWEST_BYTES_PER_S = 16 * 1024
 MAX_MEMBERS = 64
 """Of one gzip body: thousands of empty members would cost seconds and inflate to nothing."""
 _GZIP = 16 + zlib.MAX_WBITS
+_PART = 1024 * 1024
 
 
 def media_type_of(request: Request) -> str:
@@ -40,24 +41,30 @@ def require_media_type(request: Request, accepted: Iterable[str], named: Iterabl
 
 async def read_body(request: Request, limit: int, slug: str = "body-too-large") -> bytes:
     """The whole body, inflated if it is gzip; 413 as soon as it, sent or inflated, passes `limit` bytes."""
+    parts = [part async for part in body_parts(request, limit, slug)]
+    return parts[0] if len(parts) == 1 else b"".join(parts)
+
+
+async def body_parts(request: Request, limit: int, slug: str) -> AsyncGenerator[bytes, None]:
+    """The same as it arrives, in parts of bounded size."""
     inflate = _inflater(request, limit, slug)
     declared = request.headers.get("content-length", "")
     if declared.isdigit() and int(declared) > limit:
         raise _too_large(limit, slug)
-    parts, received = [], 0
+    received, more = 0, True
     loop = asyncio.get_running_loop()
     started, patience = loop.time(), request.app.state.settings.body_timeout_s
-    while True:
+    while more:
         deadline = started + patience + received / SLOWEST_BYTES_PER_S
         chunk, more = await _next_chunk(request, deadline)
         received += len(chunk)
         if received > limit:
             raise _too_large(limit, slug)
-        parts.append(chunk)
-        if not more:
-            break
-    body = parts[0] if len(parts) == 1 else b"".join(parts)
-    return inflate.whole(body) if inflate else body
+        if inflate is None:
+            yield chunk
+        else:
+            for part in inflate.feed(chunk, more=more):
+                yield part
 
 
 async def _next_chunk(request: Request, deadline: float) -> tuple[bytes, bool]:
@@ -86,29 +93,38 @@ def _inflater(request: Request, limit: int, slug: str) -> _Gzip | None:
 
 
 class _Gzip:
-    """A gzip body of one or more members, never inflated beyond the bound."""
+    """A gzip body of one or more members as it arrives, never inflated beyond the bound."""
 
     def __init__(self, limit: int, slug: str) -> None:
-        self.limit, self.slug = limit, slug
+        self.limit, self.slug, self.room = limit, slug, limit
+        self.members = 1
+        self.member = zlib.decompressobj(_GZIP)
 
-    def whole(self, body: bytes) -> bytes:
-        parts, room = [], self.limit
-        for _ in range(MAX_MEMBERS):
-            member = zlib.decompressobj(_GZIP)
-            try:
-                part = member.decompress(body, room + 1)
-            except zlib.error:
-                raise Problem("malformed-request", "The body is not valid gzip.") from None
-            room -= len(part)
-            if room < 0:
-                raise _too_large(self.limit, self.slug)
-            if not member.eof:
-                raise Problem("malformed-request", "The gzip body is not complete.")
-            parts.append(part)
-            body = member.unused_data
-            if not body:
-                return b"".join(parts)
-        raise Problem("malformed-request", f"The gzip body may have at most {MAX_MEMBERS} members.")
+    def feed(self, data: bytes, *, more: bool) -> Iterator[bytes]:
+        """What the next bytes inflate to; without `more` they are the last."""
+        while data:
+            if self.member.eof:
+                self._next_member()
+            yield self._inflate(data)
+            data = self.member.unconsumed_tail or self.member.unused_data
+        if not more and not self.member.eof:
+            raise Problem("malformed-request", "The gzip body is not complete.")
+
+    def _inflate(self, data: bytes) -> bytes:
+        try:
+            part = self.member.decompress(data, min(_PART, self.room + 1))
+        except zlib.error:
+            raise Problem("malformed-request", "The body is not valid gzip.") from None
+        self.room -= len(part)
+        if self.room < 0:
+            raise _too_large(self.limit, self.slug)
+        return part
+
+    def _next_member(self) -> None:
+        self.members += 1
+        if self.members > MAX_MEMBERS:
+            raise Problem("malformed-request", f"The gzip body may have at most {MAX_MEMBERS} members.")
+        self.member = zlib.decompressobj(_GZIP)
 
 
 async def read_json(request: Request, model: type[Model]) -> Model:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from anyio.to_thread import run_sync
 from sqlalchemy import Connection
@@ -17,8 +17,10 @@ from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
 from headimpact_service.errors import Problem
 from headimpact_service.intake.scoring import Terms
 from headimpact_service.settings import Settings
-from headimpact_service.store import ids, keys
+from headimpact_service.store import ids, jobs, keys
 from headimpact_service.store.database import Database
+from headimpact_service.store.jobs import Job, NewJob
+from headimpact_service.store.uploads import Uploads, job_folder
 
 T = TypeVar("T")
 
@@ -132,11 +134,44 @@ async def authorize(request: Request, access: str) -> Caller:
     return caller
 
 
-def set_up(app: Starlette, settings: Settings, database: Database) -> None:
+class JobEngine(Protocol):
+    """What runs jobs; the operations know no more of it than this."""
+
+    def start(self) -> None:
+        """Begin, beside the caller."""
+
+    def wake(self) -> None:
+        """Look at the jobs now."""
+
+    def stop(self) -> None:
+        """Hand back what is under way, and end."""
+
+
+class NoEngine:
+    """Jobs are only written down here; another process runs them."""
+
+    def start(self) -> None:
+        """Nothing begins."""
+
+    def wake(self) -> None:
+        """The other process looks often enough."""
+
+    def stop(self) -> None:
+        """Nothing ends."""
+
+
+def uploads_of(settings: Settings, database: Database) -> Uploads:
+    """Where uploads wait for their job."""
+    return Uploads(settings.upload_folder or job_folder(database.url) / "uploads")
+
+
+def set_up(app: Starlette, settings: Settings, database: Database, engine: JobEngine | None = None) -> None:
     """Give the application what its operations stand on."""
     app.state.settings = settings
     app.state.database = database
     app.state.gate = Gate(database, settings.rate_limit)
+    app.state.engine = engine or NoEngine()
+    app.state.uploads = uploads_of(settings, database)
 
 
 async def read(request: Request, query: Callable[[Connection], T]) -> T:
@@ -154,6 +189,13 @@ async def write(request: Request, change: Callable[[Connection], T]) -> T:
     """The result of a change, once it is committed."""
     database: Database = request.app.state.database
     return await database.write_async(change)
+
+
+async def submit(request: Request, data_set_id: bytes, new: NewJob) -> Job:
+    """Order a job; the job that its idempotency key made before, if there is one."""
+    job = await write(request, lambda conn: jobs.submit(conn, data_set_id, new))
+    request.app.state.engine.wake()
+    return job
 
 
 def identifier(prefix: str, text: str, what: str) -> bytes:

@@ -261,6 +261,10 @@ class Problem(Exception):  # noqa: N818 - the name of RFC 9457; it is an answer,
         self.headers = dict(headers or {})
         self.extra = dict(extra or {})
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As another process gets it, also one of a subclass."""
+        return _again, (self.slug, self.detail, self.errors, self.headers, self.extra)
+
     @property
     def status(self) -> int:
         """The HTTP status."""
@@ -277,6 +281,12 @@ class Problem(Exception):  # noqa: N818 - the name of RFC 9457; it is an answer,
         if self.errors:
             document["errors"] = [error.as_dict() for error in self.errors]
         return document | self.extra
+
+
+def _again(
+    slug: str, detail: str, errors: tuple[PayloadError, ...], headers: Mapping[str, str], extra: Mapping[str, Any]
+) -> Problem:
+    return Problem(slug, detail, errors=errors, headers=headers, extra=extra)
 
 
 def not_found(what: str) -> Problem:

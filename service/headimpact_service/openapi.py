@@ -27,7 +27,11 @@ _WITH_BODY = (
     "unsupported-media-type",
     "invalid-payload",
 )
-_HEADER_SCHEMAS = {"If-Match": {"type": "string", "pattern": r'^("[1-9][0-9]{0,8}"|\*)$'}}
+_HEADER_SCHEMAS = {
+    "If-Match": {"type": "string", "pattern": r'^("[1-9][0-9]{0,8}"|\*)$'},
+    "Idempotency-Key": {"type": "string", "pattern": r"^[!-~]{1,200}$"},
+    "Prefer": {"type": "string", "enum": ["respond-async"]},
+}
 _PROBLEM_HEADERS = {401: "WWW-Authenticate", 429: "Retry-After", 503: "Retry-After"}
 _ABOUT = """\
 Head-impact traces in; brain angles, injury criteria and concussion probabilities out, after Laksari, Fanton et al.,

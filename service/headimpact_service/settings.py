@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
@@ -20,6 +21,13 @@ class Settings(BaseSettings):
     port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
     max_body: int = Field(default=8 * MEBIBYTE, ge=1, description="Largest JSON body, as sent and inflated [bytes].")
     max_upload: int = Field(default=512 * MEBIBYTE, ge=1, description="Largest upload, as sent and inflated [bytes].")
+    upload_folder: Path | None = Field(
+        default=None, description="Where large uploads wait for their job; beside an SQLite file unless set."
+    )
+    job_retention_days: int = Field(default=30, ge=1, description="Ended jobs stay listed this long [days].")
+    job_memory: int = Field(
+        default=4096 * MEBIBYTE, ge=256 * MEBIBYTE, description="Most memory a job's process may take [bytes]."
+    )
     head_timeout_s: float = Field(default=20.0, gt=0, description="A request's head must arrive within this time [s].")
     body_timeout_s: float = Field(default=30.0, gt=0, description="Longest pause between two parts of a body [s].")
     rate_limit: int | None = Field(default=None, ge=1, description="Requests a minute and key; none unless set.")

@@ -98,8 +98,10 @@ WAYS: list[tuple[str, str, Way]] = [
     ),
     (
         "import-too-large",
-        "1001 impacts",
-        lambda api: api.post("/v1/imports", content=b"{}\n" * 1001, headers={"Content-Type": "application/x-ndjson"}),
+        "a dry run of 1001 impacts",
+        lambda api: api.post(
+            "/v1/imports?dry_run=true", content=b"{}\n" * 1001, headers={"Content-Type": "application/x-ndjson"}
+        ),
     ),
     (
         "unsupported-media-type",

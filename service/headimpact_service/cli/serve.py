@@ -10,6 +10,7 @@ from headimpact_service.app import create_app
 from headimpact_service.cli.database import migrated
 from headimpact_service.cli.example import curl
 from headimpact_service.deps import SCOPES
+from headimpact_service.jobs.engine import engine_of
 from headimpact_service.serving import listen
 from headimpact_service.serving import run as serve_until_stopped
 from headimpact_service.settings import Settings
@@ -31,7 +32,7 @@ def run(*, host: str | None, port: int | None, database_url: str | None) -> None
         _first_key(database, address)
         for warning in database.warnings():
             say(f"Warning: {warning}")
-        app = create_app(settings, database)
+        app = create_app(settings, database, engine_of(settings, database))
         serve_until_stopped(app, settings, listener, lambda: say(f"Listening on {address} (documentation: /docs)"))
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from functools import partial
+from itertools import islice
 from typing import Annotated, Any, Literal
 
 from anyio.to_thread import run_sync
@@ -11,24 +11,21 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from starlette.responses import Response
 
 from headimpact_service.answers import answer
-from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import list_presets
-from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.upload import read_upload
-from headimpact_service.intake.importing import preview_row, summary
+from headimpact_service.intake.importing import Found, preview_row, summary
 from headimpact_service.operation import ANY_KEY, Answer, BodyForm, Call, Routes
 from headimpact_service.parameters import Flag, Query, validate_parameters
-from headimpact_service.problem_shapes import ProblemDocument
-from headimpact_service.routes.impact_shapes import KinematicsView
 from headimpact_service.routes.import_flow import score_all, store_all
-from headimpact_service.routes.score_shapes import PeaksView, QualityView
-from headimpact_service.routes.uploads import MULTIPART, RAW, Upload, read_file
+from headimpact_service.routes.import_jobs import earlier_job, order_import, wants_job
+from headimpact_service.routes.import_shapes import ImportView
+from headimpact_service.routes.job_shapes import IDEMPOTENCY_KEY, LOCATION, PREFER, JobView, accepted
+from headimpact_service.routes.uploads import MULTIPART, RAW, Upload, received
 
 routes = Routes("imports")
 
 MAX_IMPACTS = 1000
-Status = Literal["created", "unchanged", "failed", "readable"]
 FieldText = Annotated[str | None, Field(max_length=200)]
 
 
@@ -65,45 +62,6 @@ class ImportForm(BaseModel):
     dry_run: Literal["true", "false"] = "false"
 
 
-class PreviewView(BaseModel):
-    """What a dry run understood of an impact."""
-
-    athlete: str | None
-    device: str | None
-    occurred_at: datetime | None
-    kinematics: KinematicsView
-    source: dict[str, Any]
-    state: Literal["scored", "unscorable"]
-    peaks: PeaksView
-    quality: list[QualityView]
-
-
-class ImportedView(BaseModel):
-    """What became of one impact of the file."""
-
-    index: int
-    external_id: str | None
-    status: Status
-    id: str | None
-    problem: ProblemDocument | None
-    preview: PreviewView | None = Field(None, description="Only of a dry run.")
-
-
-class SummaryView(BaseModel):
-    """How many of each."""
-
-    created: int
-    unchanged: int
-    failed: int
-
-
-class ImportView(BaseModel):
-    """What became of a file."""
-
-    data: list[ImportedView]
-    summary: SummaryView
-
-
 class PresetList(BaseModel):
     """Every preset, on one page."""
 
@@ -116,39 +74,44 @@ class PresetList(BaseModel):
     "/v1/imports",
     "Import a file",
     "impacts:write",
-    {207: Answer(ImportView, "What became of each impact, even of a single one.")},
+    {
+        207: Answer(ImportView, "What became of each impact, even of a single one."),
+        202: Answer(JobView, "A job imports it.", headers=LOCATION),
+    },
     query=ImportQuery,
     body_forms=(BodyForm(MULTIPART, ImportForm), *(BodyForm(media_type, None) for media_type in RAW)),
-    problems=("invalid-parameter", "unreadable-file", "import-too-large"),
+    request_headers=IDEMPOTENCY_KEY | PREFER,
+    problems=("invalid-parameter", "unreadable-file", "import-too-large", "idempotency-conflict"),
 )
 async def import_file(call: Call) -> Response:
-    """CSV, JSON, NDJSON and NHTSA zip, told apart by their content. Up to 1000 impacts and 16 MiB.
+    """CSV, JSON, NDJSON and NHTSA zip, told apart by their content.
 
+    Up to 1000 impacts and 16 MiB are answered at once, unless `Prefer: respond-async` asks for a job; more is a job.
     An impact whose athlete, time and signals are stored already is `unchanged`, whatever the file is called.
     """
-    upload = await read_file(call.request)
-    options, dry_run = _options(upload)
-    found = await run_sync(partial(_read, upload.data, options))
+    async with received(call.request) as upload:
+        fields = validate_parameters(upload.fields, ImportQuery)
+        sent = fields.model_dump(exclude={"dry_run"}, exclude_none=True)
+        options = ImportOptions.from_fields(sent, filename=upload.filename, content_type=upload.content_type)
+        if (earlier := await earlier_job(call, upload, sent)) is not None:
+            return accepted(earlier)
+        found = None
+        if not wants_job(call.request, upload, dry_run=fields.dry_run):
+            found = await run_sync(partial(_read, upload, options))
+        if found is None:
+            return accepted(await order_import(call, upload, sent, dry_run=fields.dry_run))
     items = await score_all(call, found)
-    if dry_run:
+    if fields.dry_run:
         rows = [preview_row(index, item) for index, item in enumerate(items)]
     else:
         rows = await store_all(call, items)
     return answer({"data": rows, "summary": summary(rows)}, 207)
 
 
-def _options(upload: Upload) -> tuple[ImportOptions, bool]:
-    fields = validate_parameters(upload.fields, ImportQuery)
-    texts = fields.model_dump(exclude={"dry_run"}, exclude_none=True)
-    options = ImportOptions.from_fields(
-        texts, filename=upload.filename, content_type=upload.content_type, max_impacts=MAX_IMPACTS
-    )
-    return options, fields.dry_run
-
-
-def _read(data: bytes, options: ImportOptions) -> list[ImpactRecord | Problem]:
-    """The whole file first: where it breaks in its midst, nothing of it is stored."""
-    return list(read_upload(data, options))
+def _read(upload: Upload, options: ImportOptions) -> Found | None:
+    """The whole file first: where it breaks in its midst, nothing of it is stored. None for too many impacts."""
+    found = list(islice(read_upload(upload.file.contents(), options), MAX_IMPACTS + 1))
+    return found if len(found) <= MAX_IMPACTS else None
 
 
 @routes("GET", "/v1/presets", "List known layouts", ANY_KEY, {200: Answer(PresetList, "All presets.")})

@@ -13,10 +13,18 @@ from types import TracebackType
 from typing import BinaryIO
 from uuid import uuid4
 
+from sqlalchemy.engine import URL
+
 PARTIAL = ".part"
 BLOCK = 1024 * 1024
 PRIVATE = 0o600
 """Files of people's measurements are for this user only."""
+
+
+def job_folder(url: URL) -> Path:
+    """Where the files of a database's jobs are: beside an SQLite file, else where the service was started."""
+    file = (url.database or "").removeprefix("file:").partition("?")[0]
+    return Path(f"{file}-jobs") if url.get_backend_name() == "sqlite" else Path("headimpact-jobs")
 
 
 class Uploads:

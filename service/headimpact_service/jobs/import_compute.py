@@ -1,0 +1,60 @@
+"""What the child process of an import does: read the file, score it part by part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count, islice
+from pathlib import Path
+from typing import Any
+
+from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.upload import read_upload
+from headimpact_service.intake.importing import Ready, look_up, make_ready, score_found
+from headimpact_service.intake.scoring import Terms
+from headimpact_service.store.database import Database
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Some impacts of the file, ready to be stored; `first` is the index of the first of them."""
+
+    number: int
+    first: int
+    ready: list[Ready]
+
+
+def compute(arguments: dict[str, Any]) -> Iterator[int | Chunk]:
+    """How many impacts the file holds, unless that is known; then its chunks, from the first that is not stored.
+
+    The file is read to its end before anything of it is scored: one that breaks in its midst stores nothing, as in a
+    request.
+    """
+    path, size = Path(arguments["path"]), arguments["chunk"]
+    options = ImportOptions.from_fields(arguments["fields"], **arguments["known"])
+    if arguments["total"] is None:
+        yield sum(1 for _ in read_upload(path, options))
+    database = Database(arguments["database_url"], readers=1)
+    try:
+        yield from _chunks(database, read_upload(path, options), size, arguments)
+    finally:
+        database.close()
+
+
+def _chunks(database: Database, found: Iterator[Any], size: int, arguments: dict[str, Any]) -> Iterator[Chunk]:
+    data_set_id, key_id, terms = arguments["data_set_id"], arguments["key_id"], _terms(arguments["terms"])
+    for number in count():
+        part = list(islice(found, size))
+        if not part:
+            return
+        if number < arguments["first"]:
+            continue
+        with database.read() as conn:
+            known = look_up(conn, data_set_id, part)
+        yield Chunk(number, number * size, make_ready(score_found(part, known, terms), key_id))
+
+
+def _terms(sent: dict[str, Any]) -> Terms:
+    points = tuple(OperatingPointRequest(**point) for point in sent["operating_points"])
+    return Terms(incidence=sent["incidence"], operating_points=points or DEFAULT_OPERATING_POINTS)

@@ -1,0 +1,60 @@
+"""The import of a large file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from headimpact_service.intake.importing import COUNTED, store, summary
+from headimpact_service.jobs.import_compute import Chunk
+from headimpact_service.jobs.runs import House, Outcome, Work
+from headimpact_service.store import ids
+from headimpact_service.store.jobs import Job
+
+SHOWN = 1000
+"""Refused impacts that a result lists; it counts them all."""
+
+
+class ImportFile:
+    """Each part is some hundred impacts, committed together."""
+
+    name = "import"
+
+    def run(self, work: Work) -> None:
+        """Go on behind the parts that are committed."""
+        with work.computing("headimpact_service.jobs.import_compute:compute", self._arguments(work)) as values:
+            for value in values:
+                if isinstance(value, Chunk):
+                    work.commit(value.number, len(value.ready), partial(_store, work.job.data_set_id, value))
+                else:
+                    work.expect(value)
+
+    def result(self, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+        """How many were created, unchanged and failed, and the first of those that failed."""
+        counts = {name: sum(outcome["summary"][name] for outcome in outcomes) for name in COUNTED}
+        failed = [row for outcome in outcomes for row in outcome["failed"]][:SHOWN]
+        return {"summary": counts, "failed": failed, "failed_not_shown": counts["failed"] - len(failed)}
+
+    def clean(self, job: Job, house: House) -> None:
+        """Delete the upload."""
+        house.uploads.remove(ids.encode("job", job.id))
+
+    def _arguments(self, work: Work) -> dict[str, Any]:
+        job = work.job
+        sent: Mapping[str, Any] = job.arguments
+        return {
+            **sent,
+            "path": str(work.house.uploads.path(ids.encode("job", job.id))),
+            "database_url": work.house.database.url.render_as_string(hide_password=False),
+            "data_set_id": job.data_set_id,
+            "key_id": job.key_id,
+            "total": job.total,
+            "first": work.chunks,
+        }
+
+
+def _store(data_set_id: bytes, chunk: Chunk, conn: Any) -> Outcome:  # noqa: ANN401 - a connection of the store
+    rows = store(conn, data_set_id, chunk.ready, chunk.first)
+    failed = [row for row in rows if row["status"] == "failed"]
+    return {"summary": summary(rows), "failed": failed[:SHOWN]}

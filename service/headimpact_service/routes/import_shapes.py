@@ -1,0 +1,63 @@
+"""What became of an imported file, as answers and jobs show it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from headimpact_service.problem_shapes import ProblemDocument
+from headimpact_service.routes.impact_shapes import KinematicsView
+from headimpact_service.routes.score_shapes import PeaksView, QualityView
+
+Status = Literal["created", "unchanged", "failed", "readable"]
+
+
+class PreviewView(BaseModel):
+    """What a dry run understood of an impact."""
+
+    athlete: str | None
+    device: str | None
+    occurred_at: datetime | None
+    kinematics: KinematicsView
+    source: dict[str, Any]
+    state: Literal["scored", "unscorable"]
+    peaks: PeaksView
+    quality: list[QualityView]
+
+
+class ImportedView(BaseModel):
+    """What became of one impact of the file."""
+
+    index: int
+    external_id: str | None
+    status: Status
+    id: str | None
+    problem: ProblemDocument | None
+    preview: PreviewView | None = Field(None, description="Only of a dry run.")
+
+
+class SummaryView(BaseModel):
+    """How many of each."""
+
+    created: int
+    unchanged: int
+    failed: int
+
+
+class ImportView(BaseModel):
+    """What became of a file."""
+
+    data: list[ImportedView]
+    summary: SummaryView
+
+
+class ImportResult(BaseModel):
+    """What a job has imported until it ended."""
+
+    summary: SummaryView
+    failed: list[ImportedView] | None = Field(
+        None, description="The first 1000 refused impacts, in the file's order; not in lists."
+    )
+    failed_not_shown: int | None = Field(None, description="Refused impacts behind those; not in lists.")
