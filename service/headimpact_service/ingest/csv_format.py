@@ -11,9 +11,12 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import chain, islice
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
@@ -21,6 +24,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.source import Source
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
 
@@ -37,9 +41,10 @@ Block = tuple[FloatArray, list[list[str]]]
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
 
-def read_csv(data: bytes, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+def read_csv(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
     """The impacts of a CSV file."""
-    return read_table(CsvTable(data, skip_rows=_skip_rows(options)), options, format_name="csv")
+    with source.open() as stream:
+        yield from read_table(CsvTable(stream, skip_rows=_skip_rows(options)), options, format_name="csv")
 
 
 def _skip_rows(options: ImportOptions) -> int:
@@ -52,11 +57,15 @@ def _skip_rows(options: ImportOptions) -> int:
 class CsvTable:
     """The headings of a CSV file, and its columns when they are asked for."""
 
-    def __init__(self, data: bytes, *, skip_rows: int = 0) -> None:
-        """Read as far as the headings; 422 where there are none."""
-        _require_text(data)
-        self._lines = io.TextIOWrapper(io.BytesIO(data), encoding=_encoding(data), newline="")
-        self._quoted = b'"' in data
+    parted = False
+    units: Mapping[int, str] = MappingProxyType({})
+
+    def __init__(self, stream: BinaryIO, *, skip_rows: int = 0) -> None:
+        """Look through the file, then read as far as the headings; 422 where there are none."""
+        text = _text_facts(stream)
+        stream.seek(0)
+        self._lines = _lines(stream, text.encoding)
+        self._quoted = text.quoted
         self._line = 0
         heading = self._first_line(skip_rows)
         self._delimiter = _delimiter(heading)
@@ -65,20 +74,15 @@ class CsvTable:
         if len(self.headings) > MAX_COLUMNS:
             raise _unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
 
-    def read(self, numbers: Sequence[int], texts: Sequence[int], max_rows: int) -> Columns:
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The columns, block by block, so that only numbers are kept of the numbers."""
-        blocks: list[FloatArray] = [np.empty((0, len(numbers)))]
-        words: dict[int, list[str]] = {index: [] for index in texts}
-        count = 0
         for samples, cells in self._blocks(numbers, texts):
-            count += len(samples)
-            if count > max_rows:
-                raise _unreadable(f"An impact may have at most {max_rows} samples; a mapping's group_by parts a file.")
-            blocks.append(samples)
-            for index, column in zip(texts, cells, strict=True):
-                words[index] += column
-        columns = np.ascontiguousarray(np.concatenate(blocks).T)
-        return Columns(rows=count, numbers=dict(zip(numbers, columns, strict=True)), texts=words)
+            columns = np.ascontiguousarray(samples.T)
+            yield Columns(
+                rows=len(samples),
+                numbers=dict(zip(numbers, columns, strict=True)),
+                texts=dict(zip(texts, cells, strict=True)),
+            )
 
     def _first_line(self, skip_rows: int) -> str:
         """The line of headings: the first that is neither skipped, empty nor a comment."""
@@ -146,27 +150,58 @@ class CsvTable:
         return float("nan")
 
 
-def _require_text(data: bytes) -> None:
-    """Refuse what would make a text reader hold a great deal at once, before it starts."""
-    if b"\0" in data:
-        raise _unreadable("A text file holds no NUL bytes.")
-    start, end = 0, len(data)
-    while end - start > MAX_LINE:
-        window = start + MAX_LINE
-        last = max(data.rfind(b"\n", start, window), data.rfind(b"\r", start, window))
-        if last < 0:
-            raise _unreadable(f"A line may have at most {MAX_LINE} bytes.")
-        start = last + 1
-
-
-def _encoding(data: bytes) -> str:
-    if data.startswith(codecs.BOM_UTF8):
-        return "utf-8-sig"
+def _lines(stream: BinaryIO, encoding: str) -> Iterator[str]:
+    """The lines with their ends as they stand; the stream stays its owner's to close."""
+    text = io.TextIOWrapper(stream, encoding=encoding, newline="")
     try:
-        data.decode("utf-8")
+        yield from text
+    finally:
+        with suppress(ValueError):  # the owner has closed it before
+            text.detach()
+
+
+@dataclass(frozen=True, slots=True)
+class _TextFacts:
+    """What has to be known of a text before its first line is read."""
+
+    encoding: str
+    quoted: bool
+
+
+def _text_facts(stream: BinaryIO) -> _TextFacts:
+    """Look through the whole text; refuse what would make a text reader hold a great deal at once."""
+    utf8, quoted, line, first = codecs.getincrementaldecoder("utf-8")(), False, 0, b""
+    is_utf8 = True
+    while piece := stream.read(MAX_LINE):
+        if b"\0" in piece:
+            raise _unreadable("A text file holds no NUL bytes.")
+        first = first or piece[:3]
+        line = _line_after(piece, line)
+        quoted = quoted or b'"' in piece
+        is_utf8 = is_utf8 and _decodes(utf8, piece, final=False)
+    is_utf8 = is_utf8 and _decodes(utf8, b"", final=True)
+    marked = first == codecs.BOM_UTF8
+    if marked and not is_utf8:
+        raise _unreadable("The text is marked as UTF-8, which it is not.")
+    return _TextFacts("utf-8-sig" if marked else "utf-8" if is_utf8 else "latin-1", quoted)
+
+
+def _line_after(piece: bytes, before: int) -> int:
+    """The length of the line that the piece leaves unended; 422 where a line is too long."""
+    ends = [place for place in (piece.find(b"\n"), piece.find(b"\r")) if place >= 0]
+    if before + min(ends, default=len(piece)) > MAX_LINE:
+        raise _unreadable(f"A line may have at most {MAX_LINE} bytes.")
+    if not ends:
+        return before + len(piece)
+    return len(piece) - 1 - max(piece.rfind(b"\n"), piece.rfind(b"\r"))
+
+
+def _decodes(decoder: codecs.IncrementalDecoder, piece: bytes, *, final: bool) -> bool:
+    try:
+        decoder.decode(piece, final)
     except UnicodeDecodeError:
-        return "latin-1"
-    return "utf-8"
+        return False
+    return True
 
 
 def _delimiter(heading: str) -> str:

@@ -30,20 +30,21 @@ _BINARY = {
     b"%PDF": "PDF",
 }
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
-_HEAD = 64 * 1024
+HEAD = 64 * 1024
+"""The bytes of a file that tell its kind."""
 _NDJSON_TYPES = frozenset({"application/x-ndjson", "application/jsonl", "application/ndjson"})
 _NDJSON_NAMES = (".ndjson", ".jsonl")
 
 
 def detect(data: bytes, *, filename: str | None = None, content_type: str | None = None) -> Kind:
-    """The kind of a file.
+    """The kind of a file, by its first bytes.
 
     Raises
     ------
     Problem
         422 for an empty file; 415 for one of a kind that is not read here, by its name where it is known.
     """
-    head = data[:_HEAD].removeprefix(codecs.BOM_UTF8).lstrip()
+    head = data[:HEAD].removeprefix(codecs.BOM_UTF8).lstrip()
     if not head:
         raise Problem("unreadable-file", "The file is empty.")
     if data.startswith(_ZIP):
@@ -58,7 +59,7 @@ def _refuse_binary(data: bytes) -> None:
     for magic, name in _BINARY.items():
         if data.startswith(magic):
             raise Problem("unsupported-media-type", f"This file is {name}; files that are read: {READ}.")
-    if b"\0" in data[:_HEAD]:
+    if b"\0" in data[:HEAD]:
         raise Problem("unsupported-media-type", f"The kind of this file is not known; files that are read: {READ}.")
 
 

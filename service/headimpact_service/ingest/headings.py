@@ -26,9 +26,10 @@ def compact(heading: str) -> str:
 class Headings:
     """The headings of one table, to be looked up by any of a column's spellings."""
 
-    def __init__(self, headings: Sequence[str]) -> None:
-        """Index the headings as written and as :func:`compact` has them."""
+    def __init__(self, headings: Sequence[str], units: Mapping[int, str] | None = None) -> None:
+        """Index the headings as written and as :func:`compact` has them; `units` stand beside them in the file."""
         self.written = tuple(heading.strip() for heading in headings)
+        self.units = units or {}
         self._exact = _places(self.written)
         self._compact = _places([compact(heading) for heading in self.written])
 
@@ -101,9 +102,11 @@ class Vocabulary:
         """What a heading says, if it is made of known words."""
         return self._meanings.get(compact(heading))
 
-    def mapping(self, headings: Sequence[str]) -> mappings.Mapping:
-        """The mapping that a table's headings amount to."""
-        found = [(heading, meaning) for heading in headings if (meaning := self.understand(heading)) is not None]
+    def mapping(self, headings: Headings) -> mappings.Mapping:
+        """The mapping that a table's headings, each with the unit beside it, amount to."""
+        spoken = [f"{heading} {headings.units.get(place, '')}" for place, heading in enumerate(headings.written)]
+        understood = [(heading, self.understand(said)) for heading, said in zip(headings.written, spoken, strict=True)]
+        found = [(heading, meaning) for heading, meaning in understood if meaning is not None]
         fields: dict[str, Any] = {}
         for signal in SIGNALS:
             columns = {heading: m for heading, m in found if m.signal == signal}

@@ -16,14 +16,17 @@ from headimpact_service.ingest.json_faults import MAX_MEMBERS, members, payload_
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
+from headimpact_service.ingest.source import Source
 
 _LISTS = ("data", "impacts")
+MAX_DOCUMENT = 32 * 1024 * 1024
+"""A JSON document is held whole; more impacts come as NDJSON."""
 
 
-def read_json(data: bytes, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+def read_json(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
     """The impacts of a JSON file; pointers in a problem start at the impact."""
     refuse_table_options(options, "JSON")
-    for item in _items(_document(data), options.max_impacts):
+    for item in _items(_document(source.read(MAX_DOCUMENT)), options.max_impacts):
         try:
             yield read_item(item, options)
         except Problem as problem:

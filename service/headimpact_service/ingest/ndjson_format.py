@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 from collections.abc import Iterator
+from typing import BinaryIO
 
 from pydantic_core import from_json
 
@@ -15,16 +16,17 @@ from headimpact_service.ingest.json_format import refuse_table_options, sent_nam
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
+from headimpact_service.ingest.source import Source
 
 MAX_LINE = 8 * 1024 * 1024
 """As a JSON body: a line holds one impact."""
 
 
-def read_ndjson(data: bytes, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+def read_ndjson(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
     """The impacts of an NDJSON file; empty lines are passed over."""
     refuse_table_options(options, "NDJSON")
     count = 0
-    for number, line in _lines(data):
+    for number, line in _lines(source):
         count += 1
         if count > options.max_impacts:
             raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
@@ -58,15 +60,21 @@ def _sent_name(line: bytes) -> str | None:
         return None
 
 
-def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """The lines that are not empty, with their numbers, without splitting the whole file at once."""
-    start = len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0
-    number = 0
-    while start < len(data):
-        number += 1
-        stop = data.find(b"\n", start)
-        stop = len(data) if stop < 0 else stop
-        line = data[start:stop].strip()
-        if line:
-            yield number, line
-        start = stop + 1
+def _lines(source: Source) -> Iterator[tuple[int, bytes]]:
+    """The lines that are not empty, with their numbers; of one that is too long only the beginning."""
+    with source.open() as stream:
+        if stream.read(len(codecs.BOM_UTF8)) != codecs.BOM_UTF8:
+            stream.seek(0)
+        number = 0
+        while line := stream.readline(MAX_LINE + 1):
+            number += 1
+            if len(line) > MAX_LINE:
+                _pass_over(stream, line)
+            if stripped := line.strip():
+                yield number, line if len(line) > MAX_LINE else stripped
+
+
+def _pass_over(stream: BinaryIO, begun: bytes) -> None:
+    """Read the rest of a line that is too long."""
+    while begun and not begun.endswith(b"\n"):
+        begun = stream.readline(MAX_LINE)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -12,8 +11,9 @@ import numpy as np
 
 from headimpact.filtering import PAPER
 from headimpact.quality import QualityNote
-from headimpact.recording import AXES, SIGNALS, Recording, Signal, SignalName
-from headimpact_service.errors import PayloadError, Problem
+from headimpact.recording import AXES, SIGNALS, SignalName
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.curves import Curve, curve_fault, head_recording
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass
 from headimpact_service.ingest.nhtsa_header import Channel, CrashTest, Occupant, read_header
@@ -68,16 +68,6 @@ def _curves(names: list[str], header: str) -> dict[int, str]:
     return {number: str(path) for path, number in curves}
 
 
-@dataclass(frozen=True, slots=True)
-class _Curve:
-    """One channel's samples; `start_s` is the first one's time from the event."""
-
-    channel: Channel
-    values: FloatArray
-    stamps_s: FloatArray
-    rate: float
-
-
 class _Head:
     """One occupant's head in one test."""
 
@@ -91,17 +81,12 @@ class _Head:
         """The head's record, in the laboratory's axes and unfiltered unless the sender asks otherwise."""
         signals = {name: curves for name in SIGNALS if (curves := self._curves_of(self._channels(name)))}
         if not signals:
-            raise _fault("No head channel of this occupant has its three curves in the archive.", "no-signal")
+            raise curve_fault("No head channel of this occupant has its three curves in the archive.", "no-signal")
         mapping = preset_named(PRESET).mapping
-        signals = self._aligned(signals)
-        start_s = min(float(curves[0].stamps_s[0]) for curves in signals.values())
-        stamped = _rates_differ(signals)
-        sent: dict[str, Any] = {name: _signal(curves, stamped=stamped) for name, curves in signals.items()}
-        recording = Recording(
+        recording = head_recording(
+            signals,
             axes=mapping.axes or "anatomical",
             low_pass=PAPER if mapping.filter is None else low_pass(mapping.filter),
-            pre_trigger_ms=round(-1000.0 * start_s, 9) if start_s <= 0.0 else None,
-            **sent,
         )
         return ImpactRecord(
             recording=recording,
@@ -118,7 +103,7 @@ class _Head:
             best.setdefault(channel.axis, channel)
         return [best[axis] for axis in AXES if axis in best]
 
-    def _curves_of(self, channels: list[Channel]) -> list[_Curve]:
+    def _curves_of(self, channels: list[Channel]) -> list[Curve]:
         """The signal's three curves, or none where one is absent; what its laboratory marked invalid is held."""
         for channel in channels:
             if not channel.valid:
@@ -132,7 +117,7 @@ class _Head:
         self.read += channels
         return [self._curve(channel) for channel in channels]
 
-    def _curve(self, channel: Channel) -> _Curve:
+    def _curve(self, channel: Channel) -> Curve:
         data = self.archive.read(self.curves[channel.curve])
         stamps, values = _columns(data, channel)
         if channel.points is not None and channel.points != values.size:
@@ -140,17 +125,10 @@ class _Head:
             self._note("sample_count_mismatch", detail, channel)
         rate = nominal_rate(stamps)
         if rate is None:
-            raise _fault(f"The times of {channel.named} must increase in equal steps.", "time-not-increasing")
+            raise curve_fault(f"The times of {channel.named} must increase in equal steps.", "time-not-increasing")
         if channel.unit is None:
-            raise _fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
-        return _Curve(channel, values, stamps, rate)
-
-    def _aligned(self, curves: dict[SignalName, list[_Curve]]) -> dict[SignalName, list[_Curve]]:
-        """The curves cut to what they share: all of them if they are sampled alike, else those of each signal."""
-        if _rates_differ(curves):
-            return {name: _common(three) for name, three in curves.items()}
-        cut = iter(_common([curve for three in curves.values() for curve in three]))
-        return {name: [next(cut) for _ in three] for name, three in curves.items()}
+            raise curve_fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
+        return Curve(channel.axis, channel.unit, values, stamps, rate, channel.full_scale)
 
     def _note(self, code: str, detail: str, channel: Channel) -> None:
         self.notes.append(QualityNote(code, "warning", detail, channel.signal, channel.axis))
@@ -173,65 +151,13 @@ class _Head:
 def _columns(data: bytes, channel: Channel) -> tuple[FloatArray, FloatArray]:
     """Stamps and values: two numbers a line."""
     if len(data) > MAX_CURVE or _NUMBERS.fullmatch(data) is None:
-        raise _fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
+        raise curve_fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
     try:
         numbers = np.array(list(map(float, data.split())), dtype=np.float64)
     except ValueError:
-        raise _fault(f"The file of {channel.named} holds what is no number.", "missing-sample") from None
+        raise curve_fault(f"The file of {channel.named} holds what is no number.", "missing-sample") from None
     if numbers.size % 2 or not np.isfinite(numbers).all():
-        raise _fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
+        raise curve_fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
     if not 6 <= numbers.size <= 2 * MAX_SAMPLES:
-        raise _fault(f"The file of {channel.named} must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
+        raise curve_fault(f"The file of {channel.named} must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
     return numbers[0::2].copy(), numbers[1::2].copy()
-
-
-def _common(curves: list[_Curve]) -> list[_Curve]:
-    """Curves of one rate cut to the samples that all of them have."""
-    rate = curves[0].rate
-    if any(curve.rate != rate for curve in curves):
-        raise _fault("The three curves of a signal must be sampled at one rate.", "rates-differ")
-    start = max(float(curve.stamps_s[0]) for curve in curves)
-    offsets = [round((start - float(curve.stamps_s[0])) * rate) for curve in curves]
-    count = min(curve.values.size - offset for curve, offset in zip(curves, offsets, strict=True))
-    if count < 3:
-        raise _fault("The head's curves must overlap in time by at least 3 samples.", "no-overlap")
-    return [
-        _Curve(c.channel, c.values[o : o + count], c.stamps_s[o : o + count], rate)
-        for c, o in zip(curves, offsets, strict=True)
-    ]
-
-
-def _rates_differ(curves: dict[SignalName, list[_Curve]]) -> bool:
-    return len({curve.rate for three in curves.values() for curve in three}) > 1
-
-
-def _signal(curves: list[_Curve], *, stamped: bool) -> Signal:
-    """One signal on its rate or, where the signals' rates differ, on its stamps: they are on one clock."""
-    return Signal(
-        values=_values(curves),
-        unit=_unit(curves),
-        sample_rate_hz=None if stamped else curves[0].rate,
-        time_s=curves[0].stamps_s if stamped else None,
-        declared_range=_range(curves),
-    )
-
-
-def _values(curves: list[_Curve]) -> FloatArray:
-    return np.ascontiguousarray(np.stack([curve.values for curve in curves], axis=1))
-
-
-def _unit(curves: list[_Curve]) -> str:
-    units = {str(curve.channel.unit) for curve in curves}
-    if len(units) > 1:
-        raise _fault("The three curves of a signal must be in one unit.", "units-differ")
-    return units.pop()
-
-
-def _range(curves: list[_Curve]) -> float | None:
-    """The sensors' full scale, where all three have one: their largest, so that no smaller one raises a false alarm."""
-    scales = [curve.channel.full_scale for curve in curves]
-    return max(scale for scale in scales if scale is not None) if all(scales) else None
-
-
-def _fault(detail: str, code: str) -> Problem:
-    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code=code)])

@@ -1,8 +1,8 @@
-"""A table as a format hands it to the mapping: headings first, then the columns that a layout asks for."""
+"""A table as a format hands it to the mapping: headings first, then, block by block, the columns of a layout."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,19 +14,32 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The columns of a table, by index, all of one length; a cell that is no number is NaN."""
+    """Rows of a table, the columns by their index; a cell that is no number is NaN.
+
+    Where the format itself parts impacts, `lengths` says how many rows each of them has, a block holds whole impacts,
+    and `texts` have one cell an impact; else they have one cell a row.
+    """
 
     rows: int
     numbers: dict[int, FloatArray]
     texts: dict[int, list[str]]
+    lengths: list[int] | None = None
 
 
 class Table(Protocol):
-    """What a tabular format gives: CSV now, any other that has headings and columns likewise."""
+    """What a tabular format gives: anything that has headings and columns."""
 
     @property
     def headings(self) -> tuple[str, ...]:
         """The headings, as written."""
 
-    def read(self, numbers: Sequence[int], texts: Sequence[int], max_rows: int) -> Columns:
-        """The asked-for columns; 422 where there are more than `max_rows` rows or a row does not fit the headings."""
+    @property
+    def units(self) -> Mapping[int, str]:
+        """Units that the format states beside a heading, by column."""
+
+    @property
+    def parted(self) -> bool:
+        """Whether the format itself parts the impacts, so that every block has `lengths`."""
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
+        """The asked-for columns in the order of their rows; 422 where a row does not fit the headings."""

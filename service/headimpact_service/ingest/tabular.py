@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -26,11 +25,9 @@ from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.stamps import nominal_rate
 from headimpact_service.ingest.table import Columns, FloatArray, Table
 from headimpact_service.ingest.times import TimeError, instant
+from headimpact_service.ingest.windows import Rows, Window, windows
 
-MAX_ROWS = 20_000_000
 _PRINTABLE = re.compile(PRINTABLE)
-
-Rows = slice | list[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,20 +49,26 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     Problem
         The table as a whole cannot be read. A fault of one impact is yielded in its place instead.
     """
-    headings = Headings(table.headings)
+    headings = Headings(table.headings, table.units)
     plan = _plan(headings, options, format_name)
     layout = lay_out(plan.mapping, headings, plan.required)
     _require_rate(layout, plan)
-    max_rows = MAX_ROWS if layout.keys else MAX_SAMPLES + (plan.mapping.drop_rows or 0)
-    columns = table.read(layout.numbers, layout.texts, max_rows)
-    if columns.rows == 0:
+    blocks = table.blocks(layout.numbers, layout.texts)
+    max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
+    count = 0
+    for window in windows(blocks, layout.keys, parted=table.parted, max_single=max_single):
+        count += len(window.impacts)
+        if count > options.max_impacts:
+            raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
+        yield from _read_window(plan, layout, window)
+    if count == 0:
         raise Problem("unreadable-file", "The file has headings but no samples.")
-    impacts = _impacts(layout, columns)
-    if len(impacts) > options.max_impacts:
-        raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
-    samples = _Samples(layout, columns)
-    for rows in impacts:
-        impact = _Impact(plan, samples, rows)
+
+
+def _read_window(plan: Plan, layout: Layout, window: Window) -> Iterator[ImpactRecord | Problem]:
+    samples = _Samples(layout, window)
+    for number in range(len(window.impacts)):
+        impact = _Impact(plan, samples, number)
         try:
             yield impact.record()
         except Problem as problem:
@@ -76,7 +79,7 @@ def _plan(headings: Headings, options: ImportOptions, format_name: str) -> Plan:
     preset = _preset(headings, options)
     asked = options.mapping
     required = frozenset() if asked is None else frozenset(_names_columns(asked))
-    base = Mapping.model_construct() if preset is None else preset.mapping_for(headings.written)
+    base = Mapping.model_construct() if preset is None else preset.mapping_for(headings)
     return Plan(merge(base, asked), None if preset is None else preset.name, required, options, format_name)
 
 
@@ -116,28 +119,12 @@ def _require_rate(layout: Layout, plan: Plan) -> None:
         raise Problem("unreadable-file", fault.detail, errors=[fault])
 
 
-def _impacts(layout: Layout, columns: Columns) -> list[Rows]:
-    """The rows of each impact: one run, or, where impacts are interleaved, a list."""
-    if not layout.keys:
-        return [slice(0, columns.rows)]
-    runs: dict[tuple[str, ...], list[slice]] = {}
-    start = 0
-    for key, run in groupby(zip(*(columns.texts[index] for index in layout.keys), strict=True)):
-        stop = start + sum(1 for _ in run)
-        runs.setdefault(key, []).append(slice(start, stop))
-        start = stop
-    return [parts[0] if len(parts) == 1 else _joined(parts) for parts in runs.values()]
-
-
-def _joined(parts: list[slice]) -> list[int]:
-    return [row for part in parts for row in range(part.start, part.stop)]
-
-
 class _Samples:
-    """The whole table's columns, put together into signals once for all its impacts."""
+    """A window's columns, put together into signals once for all its impacts."""
 
-    def __init__(self, layout: Layout, columns: Columns) -> None:
-        self.layout, self.texts = layout, columns.texts
+    def __init__(self, layout: Layout, window: Window) -> None:
+        columns = window.columns
+        self.layout, self.window, self.texts = layout, window, columns.texts
         self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
         self.stamps = None if layout.time is None else columns.numbers[layout.time]
         self._numbers = columns.numbers
@@ -169,11 +156,13 @@ def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
 class _Impact:
     """One impact of a table."""
 
-    def __init__(self, plan: Plan, samples: _Samples, rows: Rows) -> None:
+    def __init__(self, plan: Plan, samples: _Samples, number: int) -> None:
         self.plan, self.samples, self.layout = plan, samples, samples.layout
         self.mapping, self.options = plan.mapping, plan.options
-        self.rows = rows
-        self.first = rows.start if isinstance(rows, slice) else rows[0]
+        window = samples.window
+        self.rows = window.impacts[number]
+        self.first = self.rows.start if isinstance(self.rows, slice) else self.rows[0]
+        self.cell = self.first if window.columns.lengths is None else number
         self.notes: list[QualityNote] = []
         self._drop()
 
@@ -213,7 +202,7 @@ class _Impact:
         mapping, options = self.mapping, self.options
         axes: AxesName = options.axes or mapping.axes or "anatomical"
         sensor = mapping.location == "sensor"
-        self.samples.require_finite(self.rows, self.first)
+        self.samples.require_finite(self.rows, self.samples.window.first + self.first)
         # Counts of hours in microseconds lose their last digits if they are scaled first: they stay as they stand.
         stamps = None if self.samples.stamps is None else self.samples.stamps[self.rows]
         rate, elapsed_s = self._rate(stamps)
@@ -260,7 +249,7 @@ class _Impact:
     def _text(self, column: int | None) -> str | None:
         if column is None:
             return None
-        return self.samples.texts[column][self.first].strip() or None
+        return self.samples.texts[column][self.cell].strip() or None
 
     def _name(self, field: str, column: int | None) -> str | None:
         text = self._text(column)

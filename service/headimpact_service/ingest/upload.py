@@ -7,23 +7,27 @@ A new format is a reader and a place in this module: in :data:`READERS` if its c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.csv_format import read_csv
-from headimpact_service.ingest.detect import READ, Kind, detect
+from headimpact_service.ingest.detect import HEAD, READ, Kind, detect
 from headimpact_service.ingest.json_format import read_json
 from headimpact_service.ingest.ndjson_format import read_ndjson
 from headimpact_service.ingest.nhtsa import is_nhtsa, read_nhtsa
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.source import Source
 from headimpact_service.ingest.zip_guard import GuardedZip
 
 Impacts = Iterator[ImpactRecord | Problem]
 
 
-def read_upload(data: bytes, options: ImportOptions) -> Impacts:
+def read_upload(content: bytes | Path, options: ImportOptions) -> Impacts:
     """The impacts of a file in its order; a fault of one impact stands in its place as a :class:`Problem`.
+
+    The file is in memory or on disk; from disk, tables and lines are read block by block.
 
     Nothing is read before the first item is asked for.
 
@@ -34,19 +38,32 @@ def read_upload(data: bytes, options: ImportOptions) -> Impacts:
     """
     if options.preset is not None:
         preset_named(options.preset)
-    kind = detect(data, filename=options.filename, content_type=options.content_type)
-    yield from READERS[kind](data, options)
+    source = Source(content)
+    kind = detect(source.head(HEAD), filename=options.filename, content_type=options.content_type)
+    values = 0
+    for item in READERS[kind](source, options):
+        values += 0 if isinstance(item, Problem) else _values(item)
+        if options.max_values is not None and values > options.max_values:
+            raise Problem("import-too-large", f"An import may hold at most {options.max_values} samples at once.")
+        yield item
 
 
-def _read_zip(data: bytes, options: ImportOptions) -> Impacts:
-    archive = GuardedZip(data)
-    for fits, read in ARCHIVES:
-        if fits(archive.names):
-            return read(archive, options)
+def _values(record: ImpactRecord) -> int:
+    """Samples of all channels."""
+    return sum(signal.values.size for _, signal in record.recording.signals())
+
+
+def _read_zip(source: Source, options: ImportOptions) -> Impacts:
+    with source.open() as stream:
+        archive = GuardedZip(stream)
+        for fits, read in ARCHIVES:
+            if fits(archive.names):
+                yield from read(archive, options)
+                return
     raise Problem("unsupported-media-type", f"The zip archive holds none of the files that are read: {READ}.")
 
 
-READERS: dict[Kind, Callable[[bytes, ImportOptions], Impacts]] = {
+READERS: dict[Kind, Callable[[Source, ImportOptions], Impacts]] = {
     Kind.CSV: read_csv,
     Kind.JSON: read_json,
     Kind.NDJSON: read_ndjson,

@@ -12,6 +12,7 @@ import struct
 import zipfile
 import zlib
 from pathlib import PurePosixPath
+from typing import BinaryIO
 
 from headimpact_service.errors import Problem
 
@@ -32,7 +33,7 @@ _METHODS = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
 class GuardedZip:
     """An archive whose directory keeps to the bounds; :meth:`read` keeps to them as well."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, content: bytes | BinaryIO) -> None:
         """Read and judge the directory.
 
         Raises
@@ -40,9 +41,10 @@ class GuardedZip:
         Problem
             422 for an archive that is broken or breaks a bound.
         """
-        _require_small_directory(data)
+        stream = io.BytesIO(content) if isinstance(content, bytes) else content
+        _require_small_directory(stream)
         try:
-            self._archive = zipfile.ZipFile(io.BytesIO(data))
+            self._archive = zipfile.ZipFile(stream)
             entries = self._archive.infolist()
         except (zipfile.BadZipFile, ValueError, struct.error, NotImplementedError, EOFError, OverflowError):
             raise _unreadable("The zip archive is broken.") from None
@@ -76,13 +78,16 @@ class GuardedZip:
             raise _unreadable("A file of the zip archive is broken.") from None
 
 
-def _require_small_directory(data: bytes) -> None:
+def _require_small_directory(stream: BinaryIO) -> None:
     """Judge the archive's last record, so that a directory of a million entries is never parsed."""
-    place = data.rfind(_END, max(0, len(data) - _END_SIZE - 0xFFFF))
+    size = stream.seek(0, io.SEEK_END)
+    stream.seek(max(0, size - _END_SIZE - 0xFFFF))
+    data = stream.read()
+    place = data.rfind(_END)
     if place < 0 or len(data) - place < _END_SIZE:
         raise _unreadable("The zip archive is broken: it has no end.")
-    entries, size = struct.unpack_from("<HI", data, place + 10)
-    if entries > MAX_ENTRIES or size > MAX_DIRECTORY:
+    entries, length = struct.unpack_from("<HI", data, place + 10)
+    if entries > MAX_ENTRIES or length > MAX_DIRECTORY:
         raise _unreadable(f"A zip archive may have at most {MAX_ENTRIES} entries.")
 
 

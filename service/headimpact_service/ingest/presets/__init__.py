@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Annotated, Any, Literal
@@ -37,7 +36,7 @@ class Preset(Strict):
     mapping: Mapping
     vocabulary: dict[str, Any] | None = None
 
-    def mapping_for(self, headings: Sequence[str]) -> Mapping:
+    def mapping_for(self, headings: Headings) -> Mapping:
         """The preset's mapping, completed by what the headings say where its vocabulary reads them."""
         if self.vocabulary is None:
             return self.mapping
@@ -46,7 +45,7 @@ class Preset(Strict):
 
     def fits(self, headings: Headings) -> bool:
         """Whether a table with these headings is of this layout: every signal's columns are there."""
-        mapping = self.mapping_for(headings.written)
+        mapping = self.mapping_for(headings)
         signals = [columns for name in SIGNALS if (columns := mapping.columns_of(name)) is not None]
         return bool(signals) and all(_is_there(columns, headings) for columns in signals)
 

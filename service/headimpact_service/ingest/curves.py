@@ -1,0 +1,127 @@
+"""Single channels of a laboratory, each a file or a column of its own, put together into the signals of one head."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from headimpact.filtering import LowPass
+from headimpact.recording import AXES, AxesName, Recording, Signal, SignalName
+from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest.table import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One channel's samples; `rate` [Hz] is None where its stamps [s] are not uniform."""
+
+    axis: str
+    unit: str
+    values: FloatArray
+    stamps_s: FloatArray
+    rate: float | None
+    full_scale: float | None = None
+
+
+Curves = Mapping[SignalName, Sequence[Curve]]
+
+
+def head_recording(
+    signals: Curves, *, axes: AxesName, low_pass: LowPass, trigger_known: bool = True, fill_gaps: bool = False
+) -> Recording:
+    """The recording that a head's channels make; time zero is the trigger.
+
+    Curves are cut to what they share: all of them if they are sampled alike, else those of each signal. An axis that a
+    signal lacks is no number.
+
+    Raises
+    ------
+    Problem
+        422: the curves of a signal differ in rate or unit, or do not overlap.
+    """
+    aligned = _aligned(signals)
+    start_s = min(float(curves[0].stamps_s[0]) for curves in aligned.values())
+    stamped = _rates_differ(aligned)
+    sent: dict[str, Any] = {name: _signal(curves, stamped=stamped) for name, curves in aligned.items()}
+    return Recording(
+        axes=axes,
+        low_pass=low_pass,
+        pre_trigger_ms=round(-1000.0 * start_s, 9) + 0.0 if trigger_known and start_s <= 0.0 else None,
+        fill_gaps=fill_gaps,
+        **sent,
+    )
+
+
+def _aligned(signals: Curves) -> dict[SignalName, list[Curve]]:
+    if _rates_differ(signals):
+        return {name: _common(curves) for name, curves in signals.items()}
+    cut = iter(_common([curve for curves in signals.values() for curve in curves]))
+    return {name: [next(cut) for _ in curves] for name, curves in signals.items()}
+
+
+def _rates_differ(signals: Curves) -> bool:
+    return len({curve.rate for curves in signals.values() for curve in curves}) > 1
+
+
+def _common(curves: Sequence[Curve]) -> list[Curve]:
+    """Curves of one rate cut to the samples that all of them have."""
+    rate = curves[0].rate
+    if any(curve.rate != rate for curve in curves):
+        raise curve_fault("The curves of one signal must be sampled at one rate.", "rates-differ")
+    if rate is None:
+        return _on_the_same_stamps(curves)
+    start = max(float(curve.stamps_s[0]) for curve in curves)
+    offsets = [round((start - float(curve.stamps_s[0])) * rate) for curve in curves]
+    count = min(curve.values.size - offset for curve, offset in zip(curves, offsets, strict=True))
+    if count < 3:
+        raise curve_fault("The head's curves must overlap in time by at least 3 samples.", "no-overlap")
+    return [
+        replace(curve, values=curve.values[o : o + count], stamps_s=curve.stamps_s[o : o + count])
+        for curve, o in zip(curves, offsets, strict=True)
+    ]
+
+
+def _on_the_same_stamps(curves: Sequence[Curve]) -> list[Curve]:
+    if any(not np.array_equal(curve.stamps_s, curves[0].stamps_s) for curve in curves):
+        raise curve_fault("Curves whose stamps are not uniform must share them.", "rates-differ")
+    return list(curves)
+
+
+def _signal(curves: Sequence[Curve], *, stamped: bool) -> Signal:
+    """One signal on its rate or, where the signals' rates differ, on its stamps: they are on one clock."""
+    rate = None if stamped else curves[0].rate
+    return Signal(
+        values=_values(curves),
+        unit=_unit(curves),
+        sample_rate_hz=rate,
+        time_s=curves[0].stamps_s if rate is None else None,
+        declared_range=_range(curves),
+    )
+
+
+def _values(curves: Sequence[Curve]) -> FloatArray:
+    values = np.full((curves[0].values.size, len(AXES)), np.nan)
+    for curve in curves:
+        values[:, AXES.index(curve.axis)] = curve.values
+    return values
+
+
+def _unit(curves: Sequence[Curve]) -> str:
+    units = {curve.unit for curve in curves}
+    if len(units) > 1:
+        raise curve_fault("The curves of one signal must be in one unit.", "units-differ")
+    return units.pop()
+
+
+def _range(curves: Sequence[Curve]) -> float | None:
+    """The sensors' full scale, where all have one: their largest, so that no smaller one raises a false alarm."""
+    scales = [curve.full_scale for curve in curves]
+    return max(scale for scale in scales if scale is not None) if all(scales) else None
+
+
+def curve_fault(detail: str, code: str) -> Problem:
+    """The 422 for channels that do not make a head."""
+    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code=code)])

@@ -1,0 +1,159 @@
+"""The rows of a table parted into impacts, a window of them at a time: a file need not fit into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.table import Columns
+
+WINDOW_ROWS = 262_144
+"""A file of no more rows may mix the rows of its impacts as it likes; in a longer one they stand near each other."""
+MAX_ROWS = 200_000_000
+
+Rows = slice | list[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Some rows of a table and the impacts in them, in the order in which these begin; `first` is its first row."""
+
+    columns: Columns
+    impacts: list[Rows]
+    first: int
+
+
+def windows(blocks: Iterable[Columns], keys: Sequence[int], *, parted: bool, max_single: int) -> Iterator[Window]:
+    """The impacts of a table: as its format parts them, by the columns `keys`, or all rows as one impact.
+
+    Raises
+    ------
+    Problem
+        422: a single impact of more than `max_single` rows, too many rows, or rows of one impact that stand too far
+        apart.
+    """
+    if parted:
+        yield from _parted(blocks)
+    elif keys:
+        yield from _keyed(blocks, keys)
+    else:
+        yield from _single(blocks, max_single)
+
+
+def _parted(blocks: Iterable[Columns]) -> Iterator[Window]:
+    first = 0
+    for block in blocks:
+        stops = np.cumsum(block.lengths or [0], dtype=np.int64).tolist()
+        impacts: list[Rows] = [slice(a, b) for a, b in zip([0, *stops[:-1]], stops, strict=True)]
+        if block.lengths:
+            yield Window(block, impacts, first)
+        first = _counted(first, block.rows)
+
+
+def _single(blocks: Iterable[Columns], max_rows: int) -> Iterator[Window]:
+    held: list[Columns] = []
+    count = 0
+    for block in blocks:
+        held.append(block)
+        count += block.rows
+        if count > max_rows:
+            raise _unreadable(f"An impact may have at most {max_rows} samples; a mapping's group_by parts a file.")
+    if count:
+        yield Window(_stacked(held), [slice(0, count)], 0)
+
+
+def _keyed(blocks: Iterable[Columns], keys: Sequence[int]) -> Iterator[Window]:
+    parting = _Parting(keys)
+    held: list[Columns] = []
+    first = count = 0
+    for block in blocks:
+        held.append(block)
+        count += block.rows
+        if count >= WINDOW_ROWS:
+            whole = _stacked(held)
+            window, rest = parting.window(whole, first)
+            if window is not None:
+                yield window
+            first, held, count = _counted(first, whole.rows - rest.rows), [rest], rest.rows
+    if count:
+        yield parting.last_window(_stacked(held), first)
+
+
+class _Parting:
+    """Parts windows of rows by their keys, and remembers which impacts were given away."""
+
+    def __init__(self, keys: Sequence[int]) -> None:
+        self._keys = keys
+        self._given: set[tuple[str, ...]] = set()
+
+    def window(self, columns: Columns, first: int) -> tuple[Window | None, Columns]:
+        """The impacts that are complete, and the rows of the last run, which may go on."""
+        runs = self._runs(columns)
+        key, last = runs[-1]
+        if last.start == 0:
+            raise _unreadable(f"More than {WINDOW_ROWS} rows belong to one impact.")
+        if any(other == key for other, _ in runs[:-1]):
+            raise _unreadable(_APART)
+        return self._window(_cut(columns, 0, last.start), runs[:-1], first), _cut(columns, last.start, columns.rows)
+
+    def last_window(self, columns: Columns, first: int) -> Window:
+        """The impacts of what is left."""
+        return self._window(columns, self._runs(columns), first)
+
+    def _runs(self, columns: Columns) -> list[tuple[tuple[str, ...], slice]]:
+        """Rows of one key that follow each other."""
+        runs: list[tuple[tuple[str, ...], slice]] = []
+        start = 0
+        for key, run in groupby(zip(*(columns.texts[index] for index in self._keys), strict=True)):
+            stop = start + sum(1 for _ in run)
+            runs.append((key, slice(start, stop)))
+            start = stop
+        return runs
+
+    def _window(self, columns: Columns, runs: list[tuple[tuple[str, ...], slice]], first: int) -> Window:
+        parts: dict[tuple[str, ...], list[slice]] = {}
+        for key, rows in runs:
+            parts.setdefault(key, []).append(rows)
+        if not self._given.isdisjoint(parts):
+            raise _unreadable(_APART)
+        self._given.update(parts)
+        return Window(columns, [rows[0] if len(rows) == 1 else _joined(rows) for rows in parts.values()], first)
+
+
+_APART = f"In a file of more than {WINDOW_ROWS} rows, the rows of one impact follow each other: sort it by impact."
+
+
+def _joined(parts: list[slice]) -> list[int]:
+    return [row for part in parts for row in range(part.start, part.stop)]
+
+
+def _stacked(blocks: list[Columns]) -> Columns:
+    if len(blocks) == 1:
+        return blocks[0]
+    return Columns(
+        rows=sum(block.rows for block in blocks),
+        numbers={index: np.concatenate([block.numbers[index] for block in blocks]) for index in blocks[0].numbers},
+        texts={index: [text for block in blocks for text in block.texts[index]] for index in blocks[0].texts},
+    )
+
+
+def _cut(columns: Columns, start: int, stop: int) -> Columns:
+    return Columns(
+        rows=stop - start,
+        numbers={index: values[start:stop] for index, values in columns.numbers.items()},
+        texts={index: cells[start:stop] for index, cells in columns.texts.items()},
+    )
+
+
+def _counted(first: int, rows: int) -> int:
+    if first + rows > MAX_ROWS:
+        raise _unreadable(f"A file may have at most {MAX_ROWS} rows.")
+    return first + rows
+
+
+def _unreadable(detail: str) -> Problem:
+    return Problem("unreadable-file", detail)
