@@ -98,7 +98,7 @@ ETAG = {"ETag": "The revision, for If-Match."}
     body=DeviceBody,
     example=examples.device(),
     request_headers=IF_MATCH,
-    problems=("precondition-failed", "improper-rotation"),
+    problems=("not-found", "precondition-failed", "improper-rotation"),  # no route holds a line feed in a serial
 )
 async def put_device(call: Call) -> Response:
     """A new mounting serves the impacts that come from now on; stored scores keep the one they were made with."""

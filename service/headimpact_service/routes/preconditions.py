@@ -9,7 +9,7 @@ from starlette.requests import Request
 from headimpact_service.errors import Problem, invalid_parameter
 
 IF_MATCH = {"If-Match": 'The ETag of the revision that is changed, `"1"`; `*` for whichever it is.'}
-_REVISION = re.compile(r'"?([1-9]\d{0,8})"?', re.ASCII)
+_REVISION = re.compile(r'"([1-9]\d{0,8})"', re.ASCII)
 _ETAG = re.compile(r'(W/)?"[^"]*"')
 
 
@@ -20,11 +20,12 @@ def etag(revision: int) -> dict[str, str]:
 
 def if_match(request: Request, *, required: bool = False) -> int | None:
     """The revision that If-Match names, None for any; 428 if it is required and absent, 412 if it cannot match."""
-    text = request.headers.get("if-match", "").strip()
-    if not text:
+    text = request.headers.get("if-match")
+    if text is None:
         if required:
             raise Problem("precondition-required", "A correction needs If-Match with the ETag of the present revision.")
         return None
+    text = text.strip()
     if text == "*":
         return None
     revision = _REVISION.fullmatch(text)

@@ -44,6 +44,9 @@ class TestPut:
             answer = api.put(f"/v1/devices/{serial}", json={})
             assert (answer.status_code, answer.json()["errors"][0]["parameter"]) == (422, "serial")
 
+    def test_a_serial_with_a_line_feed_is_no_address(self, api: Api) -> None:
+        assert api.put("/v1/devices/a%0Ab", json={}).status_code == 404
+
     def test_a_range_makes_a_flat_top_a_saturated_channel(self, api: Api) -> None:
         from sending import changed, half_sine, impact_body
 

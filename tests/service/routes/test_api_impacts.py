@@ -154,6 +154,12 @@ class TestCorrect:
         assert (answer.status_code, answer.json()["type"]) == (412, "/problems/precondition-failed")
         assert api.get(address).json() == impact
 
+    @pytest.mark.parametrize("tag", ["", "1", "nonsense", '"1", "2"'])
+    def test_an_if_match_that_is_no_tag_of_ours_is_422(self, api: Api, tag: str) -> None:
+        address = f"/v1/impacts/{api.create()['id']}"
+        answer = api.put(address, json=impact_body(scale=1.2), headers={"If-Match": tag})
+        assert (answer.status_code, answer.json()["errors"][0]["parameter"]) == (422, "If-Match")
+
 
 class TestDelete:
     def test_a_deleted_impact_is_gone_and_its_name_stays_taken(self, api: Api) -> None:
