@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from anyio.to_thread import run_sync
-from starlette.applications import Starlette
+from fastapi import FastAPI
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
@@ -16,7 +16,7 @@ from headimpact_service import deps, openapi
 from headimpact_service.answers import problem_answer
 from headimpact_service.errors import PROBLEMS, Problem
 from headimpact_service.middleware import Edge
-from headimpact_service.operation import Operation, resources
+from headimpact_service.operation import Operation
 from headimpact_service.pages import docs, problems
 from headimpact_service.routes import (
     athletes,
@@ -72,10 +72,11 @@ OPERATIONS: tuple[Operation, ...] = tuple(
 )
 
 
-def create_app(configured: Settings, database: Database, engine: deps.JobEngine | None = None) -> Starlette:
+def create_app(configured: Settings, database: Database, engine: deps.JobEngine | None = None) -> FastAPI:
     """The application on a migrated database; it runs the engine, and closes both when the server stops it."""
-    app = Starlette(
-        routes=resources(OPERATIONS),
+    app = FastAPI(
+        openapi_url=None,  # the document and its page are operations like the others: pages/docs.py
+        routes=openapi.routes(OPERATIONS),
         middleware=[Middleware(Edge, access_log=configured.access_log)],
         exception_handlers={Problem: _problem, HTTPException: _http_exception},
         lifespan=_lifespan,
@@ -88,7 +89,7 @@ def create_app(configured: Settings, database: Database, engine: deps.JobEngine 
 
 
 @asynccontextmanager
-async def _lifespan(app: Starlette) -> AsyncIterator[None]:
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.engine.start()
     yield
     await run_sync(app.state.engine.stop)

@@ -1,21 +1,30 @@
-"""The OpenAPI document, made from the operations: what they declare is what they hold."""
+"""The routes and the OpenAPI document, both made by FastAPI from the operations' declarations."""
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from typing import Annotated, Any
 
-from pydantic import BaseModel
-from pydantic.json_schema import JsonSchemaMode, models_json_schema
+from fastapi import Body, Path, Security
+from fastapi.openapi.utils import get_openapi
+from fastapi.responses import JSONResponse
+from fastapi.routing import APIRoute
+from fastapi.security import HTTPBearer
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
 
 from headimpact_service import __version__
 from headimpact_service.answers import JSON, PROBLEM_JSON
 from headimpact_service.errors import PROBLEMS
-from headimpact_service.operation import ANY_KEY, PUBLIC, Answer, BodyForm, Operation
+from headimpact_service.operation import ANY_KEY, PUBLIC, Answer, BodyForm, Operation, OtherMethods, by_path
 from headimpact_service.problem_shapes import ProblemDocument
 
+KEY = HTTPBearer(scheme_name="key", description="A key of this service.", auto_error=False)
+"""How a key is documented; :mod:`headimpact_service.deps` looks it up."""
 _REF = "#/components/schemas/{model}"
 _NAME_IN_PATH = re.compile(r"{(\w+)(?::path)?}")
 _ALWAYS = ("not-acceptable", "invalid-parameter", "internal-error", "unavailable")
@@ -45,30 +54,61 @@ with 405 and all that it takes in `Allow`. Request bodies may be gzip (`Content-
 """
 
 
+class StrictRoute(APIRoute):
+    """FastAPI's route: matched and documented by FastAPI, handled in the operation's own order of rules."""
+
+    def __init__(self, operation: Operation) -> None:
+        """The route of one operation."""
+        self.operation = operation
+        status, answer = next(iter(operation.answers.items()))
+        super().__init__(
+            operation.path,
+            _declared(operation),
+            methods=[operation.method],
+            operation_id=operation.handler.__name__,
+            tags=[operation.tag],
+            summary=operation.summary,
+            description=_description(operation),
+            status_code=status,
+            response_model=answer.model,
+            response_class=_response_class(answer),
+            response_description=answer.description,
+            responses=_responses(operation),
+            dependencies=[] if operation.access == PUBLIC else [Security(KEY)],
+            include_in_schema=operation.documented,
+            openapi_extra=_extra(operation),
+        )
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The operation itself, instead of FastAPI's reading of parameters and bodies."""
+        return self.operation.endpoint()
+
+
+def routes(operations: Sequence[Operation]) -> list[BaseRoute]:
+    """The routes of all operations; after those of each path one for every other method."""
+    found: list[BaseRoute] = []
+    for path, same_path in by_path(operations).items():
+        found += [StrictRoute(operation) for operation in same_path]
+        found.append(Route(path, OtherMethods(same_path), include_in_schema=False))
+    return found
+
+
 def document(operations: Sequence[Operation]) -> dict[str, Any]:
     """The whole document."""
-    operations = [operation for operation in operations if operation.documented]
-    references, schemas = _schemas(operations)
-    paths: dict[str, dict[str, Any]] = {}
-    for operation in operations:
-        path = paths.setdefault(operation.path.replace(":path}", "}"), {})
-        path[operation.method.lower()] = _operation(operation, references)
-    return {
-        "openapi": "3.1.0",
-        "info": {
-            "title": "Headimpact",
-            "version": __version__,
-            "description": _ABOUT,
-            "license": {"name": "Apache-2.0", "identifier": "Apache-2.0"},
-        },
-        "servers": [{"url": "/"}],
-        "tags": [{"name": tag} for tag in dict.fromkeys(operation.tag for operation in operations)],
-        "paths": paths,
-        "components": {
-            "schemas": schemas,
-            "securitySchemes": {"key": {"type": "http", "scheme": "bearer", "description": "A key of this service."}},
-        },
-    }
+    specification = get_openapi(
+        title="Headimpact",
+        version=__version__,
+        description=_ABOUT,
+        routes=routes(operations),
+        servers=[{"url": "/"}],
+        tags=[{"name": tag} for tag in dict.fromkeys(o.tag for o in operations if o.documented)],
+        license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
+    )
+    problem_document = {"ProblemDocument": ProblemDocument.model_json_schema(ref_template=_REF)}
+    specification["components"]["schemas"] |= problem_document
+    # a path's own pattern for the rest of a path is no part of its name
+    specification["paths"] = {path.replace(":path}", "}"): item for path, item in specification["paths"].items()}
+    return specification
 
 
 def as_text(specification: Mapping[str, Any]) -> str:
@@ -76,36 +116,47 @@ def as_text(specification: Mapping[str, Any]) -> str:
     return json.dumps(specification, indent=2, ensure_ascii=False) + "\n"
 
 
-Shape = tuple[type[BaseModel], JsonSchemaMode]
-References = Mapping[Any, dict[str, Any]]
-"""By shape."""
+def _declared(operation: Operation) -> Callable[..., None]:
+    """A function with the signature that FastAPI documents: the names in the path and the JSON body."""
+
+    def endpoint() -> None:
+        """Never called: the route's handler is the operation."""
+
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        inspect.Parameter(name, keyword, annotation=Annotated[str, Path(min_length=1)])
+        for name in _NAME_IN_PATH.findall(operation.path)
+    ]
+    for form in operation.body_forms:
+        if form.model is not None:
+            model: Any = form.model
+            parameters.append(
+                inspect.Parameter("body", keyword, annotation=Annotated[model, Body(media_type=form.media_type)])
+            )
+    endpoint.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined] # as inspect documents it
+    endpoint.__name__ = operation.handler.__name__
+    return endpoint
 
 
-def _schemas(operations: Iterable[Operation]) -> tuple[References, dict[str, Any]]:
-    shapes: dict[Shape, None] = {(ProblemDocument, "validation"): None}
-    for operation in operations:
-        shapes.update({(form.model, "validation"): None for form in operation.body_forms if form.model})
-        shapes.update({(answer.model, "serialization"): None for answer in operation.answers.values() if answer.model})
-    references, definitions = models_json_schema(list(shapes), ref_template=_REF)
-    return references, dict(sorted(definitions["$defs"].items()))
+def _response_class(answer: Answer) -> type[Response]:
+    """What its main media type is documented by."""
+    if answer.media_types[:1] == (JSON,):
+        return JSONResponse
+    return type("Documented", (Response,), {"media_type": next(iter(answer.media_types), None)})
 
 
-def _operation(operation: Operation, references: References) -> dict[str, Any]:
-    described: dict[str, Any] = {
-        "operationId": operation.handler.__name__,
-        "tags": [operation.tag],
-        "summary": operation.summary,
-        "description": _description(operation),
-        "parameters": [*_path_parameters(operation), *_query_parameters(operation), *_header_parameters(operation)],
-        "responses": _responses(operation, references),
-        "security": [] if operation.access == PUBLIC else [{"key": []}],
-    }
+def _extra(operation: Operation) -> dict[str, Any]:
+    """What FastAPI does not read off a signature: strict parameters, and bodies in several media types."""
+    parameters = [*_query_parameters(operation), *_header_parameters(operation)]
+    extra: dict[str, Any] = {"parameters": parameters} if parameters else {}
+    if operation.access == PUBLIC:
+        extra["security"] = []
     if operation.body_forms:
-        described["requestBody"] = {
+        extra["requestBody"] = {
             "required": operation.body_required,
-            "content": {form.media_type: _body(form, references) for form in operation.body_forms},
+            "content": {form.media_type: _body(form) for form in operation.body_forms},
         }
-    return described
+    return extra
 
 
 def _description(operation: Operation) -> str:
@@ -113,13 +164,6 @@ def _description(operation: Operation) -> str:
     if operation.access in {PUBLIC, ANY_KEY}:
         return text
     return f"{text}\n\nScope: `{operation.access}`."
-
-
-def _path_parameters(operation: Operation) -> list[dict[str, Any]]:
-    return [
-        {"name": name, "in": "path", "required": True, "schema": {"type": "string", "minLength": 1}}
-        for name in _NAME_IN_PATH.findall(operation.path)
-    ]
 
 
 def _query_parameters(operation: Operation) -> list[dict[str, Any]]:
@@ -149,40 +193,36 @@ def _header_parameters(operation: Operation) -> list[dict[str, Any]]:
     ]
 
 
-def _body(form: BodyForm, references: References) -> dict[str, Any]:
+def _body(form: BodyForm) -> dict[str, Any]:
+    """What FastAPI does not say of a body by itself."""
     if form.model is None:
         schema: dict[str, Any] = {"type": "string"}
         if form.media_type != "text/csv":
             schema["format"] = "binary"
         return {"schema": schema}
-    described = {"schema": references[form.model, "validation"]}
-    return described if form.example is None else {**described, "example": form.example}
+    return {} if form.example is None else {"example": form.example}
 
 
-def _responses(operation: Operation, references: References) -> dict[str, Any]:
-    successes = {str(status): _success(answer, references) for status, answer in operation.answers.items()}
-    return successes | _problems(operation)
+def _responses(operation: Operation) -> dict[int | str, dict[str, Any]]:
+    return {status: _success(answer) for status, answer in operation.answers.items()} | _problems(operation)
 
 
-def _success(answer: Answer, references: References) -> dict[str, Any]:
+def _success(answer: Answer) -> dict[str, Any]:
     described: dict[str, Any] = {"description": answer.description}
+    if answer.model is not None:
+        described["model"] = answer.model
     if answer.headers:
         described["headers"] = {
             name: {"description": text, "required": True, "schema": {"type": "string"}}
             for name, text in answer.headers.items()
         }
-    content: dict[str, Any] = {}
-    for media_type in answer.media_types:
-        content[media_type] = {"schema": _answer_schema(answer, media_type, references)}
-    if content:
-        described["content"] = content
+    if answer.media_types:
+        described["content"] = {
+            media_type: {"schema": {"type": "object"} if media_type == JSON else {"type": "string"}}
+            for media_type in answer.media_types
+            if media_type != JSON or answer.model is None
+        }
     return described
-
-
-def _answer_schema(answer: Answer, media_type: str, references: References) -> dict[str, Any]:
-    if media_type != JSON:
-        return {"type": "string"}
-    return {"type": "object"} if answer.model is None else references[answer.model, "serialization"]
 
 
 def _slugs(operation: Operation) -> list[str]:
@@ -194,11 +234,11 @@ def _slugs(operation: Operation) -> list[str]:
     return list(dict.fromkeys(slugs))
 
 
-def _problems(operation: Operation) -> dict[str, Any]:
+def _problems(operation: Operation) -> dict[int | str, dict[str, Any]]:
     by_status: dict[int, list[str]] = {}
     for slug in _slugs(operation):
         by_status.setdefault(PROBLEMS[slug].status, []).append(slug)
-    return {str(status): _problem(status, slugs) for status, slugs in sorted(by_status.items())}
+    return {status: _problem(status, slugs) for status, slugs in sorted(by_status.items())}
 
 
 def _problem(status: int, slugs: Sequence[str]) -> dict[str, Any]:

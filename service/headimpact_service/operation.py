@@ -1,21 +1,19 @@
 """One operation of the API: its rules and its documentation declared once, both held from that.
 
 Every operation does the same things in the same order: key (401), scope (403), Accept (406), parameters (422), body
-(415, 413, 408, 400, 422), and only then its own work. Plain Starlette underneath: FastAPI reads and parses a body
-before any of its dependencies runs, names one method only in a 405, reads parameters laxer than the API's rules, and
-costs more CPU than the scoring itself (docs/adr/0008-starlette.md).
+(415, 413, 408, 400, 422), and only then its own work. FastAPI routes it and documents it; its request handler, which
+would read a body before it looks at a key, is replaced where FastAPI provides for that (docs/adr/0008-fastapi.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from pydantic import BaseModel
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
 from headimpact_service import deps
@@ -116,7 +114,7 @@ class Operation:
         """The media types of its success, the preferred one first; none for an empty answer."""
         return next(iter(self.answers.values())).media_types
 
-    def endpoint(self) -> Callable[[Request], Awaitable[Response]]:
+    def endpoint(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The function that holds the rules, then does the work."""
         access, query_model, body_model, handler = self.access, self.query, self.body, self.handler
         offered = self.media_types
@@ -189,26 +187,21 @@ class Routes:
         return declare
 
 
-class Resource:
-    """The operations of one path, as an ASGI application: any other method is 405 with all of them in `Allow`."""
+class OtherMethods:
+    """Whatever a path's operations do not take: 405 with all that they take in `Allow`, where FastAPI names one."""
 
     def __init__(self, operations: Sequence[Operation]) -> None:
         """All `operations` share one path."""
-        self.endpoints = {operation.method: operation.endpoint() for operation in operations}
-        self.allowed = ", ".join(sorted(self.endpoints))
+        self.allowed = ", ".join(sorted(operation.method for operation in operations))
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
-        endpoint = self.endpoints.get(scope["method"])
-        if endpoint is None:
-            raise Problem("method-not-allowed", f"This path takes {self.allowed}.", headers={"Allow": self.allowed})
-        response = await endpoint(Request(scope, receive, send))
-        await response(scope, receive, send)
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002 - ASGI's signature
+        """Refuse one request."""
+        raise Problem("method-not-allowed", f"This path takes {self.allowed}.", headers={"Allow": self.allowed})
 
 
-def resources(operations: Sequence[Operation]) -> list[Route]:
-    """One route for each path of the operations, in their order."""
-    by_path: dict[str, list[Operation]] = {}
+def by_path(operations: Sequence[Operation]) -> dict[str, list[Operation]]:
+    """The operations of each path, in their order."""
+    found: dict[str, list[Operation]] = {}
     for operation in operations:
-        by_path.setdefault(operation.path, []).append(operation)
-    return [Route(path, Resource(same_path)) for path, same_path in by_path.items()]
+        found.setdefault(operation.path, []).append(operation)
+    return found

@@ -82,7 +82,7 @@ class TestDocument:
         for path, operations in document()["paths"].items():
             assert set(operations) <= METHODS
             for operation in operations.values():
-                declared = {p["name"] for p in operation["parameters"] if p["in"] == "path"}
+                declared = {p["name"] for p in operation.get("parameters", []) if p["in"] == "path"}
                 assert declared == set(re.findall(r"{(\w+)}", path))
 
     def test_every_operation_says_its_scope(self) -> None:
