@@ -75,7 +75,8 @@ def commit(
     if conn.execute(_CHUNK, {"job_id": job_id, "chunk": chunk}).first() is None:
         outcome = dict(write(conn))
         conn.execute(insert(job_chunks), {"job_id": job_id, "number": chunk, "outcome": outcome})
-        _change(conn, job_id, datetime.now(UTC), {"done": found.done + done, "crashes": 0})
+        # The job got on: of all its runs only this one may still turn out to crash here.
+        _change(conn, job_id, datetime.now(UTC), {"done": found.done + done, "crashes": 1})
     return "stored"
 
 

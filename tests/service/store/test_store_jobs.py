@@ -101,7 +101,7 @@ class TestParts:
             begun(database, job)
         assert read(database, job).crashes == 2
         committed(database, job, 0, [])
-        assert read(database, job).crashes == 0
+        assert read(database, job).crashes == 1
 
     def test_a_run_that_is_handed_back_in_peace_is_no_crash(self, database: Database, job: Job) -> None:
         begun(database, job)
