@@ -3,13 +3,15 @@
     uv run python benchmarks/request_cost.py
 
 Both are separate processes on loopback; what is counted is the server process's user and system time, the writer
-thread and SQLite included. One keep-alive connection, complete requests: key, checks, filter, score, answer.
+thread and SQLite included. Complete requests on keep-alive connections: key, checks, filter, score, answer. Measured
+with one sender, where every commit is its own, and with eight at once, where those that wait share one.
 """
 
 from __future__ import annotations
 
 import contextlib
 import http.client
+import itertools
 import json
 import os
 import socket
@@ -17,8 +19,10 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +67,7 @@ def free_port() -> int:
 
 
 class Server:
-    """A server process with one keep-alive connection to it."""
+    """A server process, and keep-alive connections to it, one a sender."""
 
     def __init__(self, command: list[str], port: int, folder: str) -> None:
         self.output = Path(folder, f"{port}.log")
@@ -72,7 +76,6 @@ class Server:
             self.process = subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log)
         self.port = port
         self._wait()
-        self.connection = http.client.HTTPConnection("127.0.0.1", port)
 
     def _wait(self) -> None:
         for _ in range(200):
@@ -85,21 +88,29 @@ class Server:
         fields = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / TICK
 
-    def post(self, path: str, sent: bytes, headers: dict[str, str], expected: int) -> None:
-        self.connection.request("POST", path, sent, {"Content-Type": "application/json", **headers})
-        answer = self.connection.getresponse()
-        content = answer.read()
-        if answer.status != expected:
-            raise SystemExit(f"{path}: {answer.status} {content[:500]!r}")
-
-    def cost(self, send: Callable[[], None]) -> float:
-        self.connection.close()  # a server drops a connection that idles while the others are measured
+    def cost(self, send: Callable[[http.client.HTTPConnection], None], senders: int) -> float:
+        """CPU seconds of one request."""
         before = self.cpu_seconds()
-        for _ in range(REQUESTS):
-            send()
+        with ThreadPoolExecutor(senders) as pool:
+            list(pool.map(lambda _: self._send(send, REQUESTS // senders), range(senders)))
         # what the writer does after the answer, if anything, is the request's cost too
         time.sleep(0.05)
-        return (self.cpu_seconds() - before) / REQUESTS
+        return (self.cpu_seconds() - before) / (REQUESTS // senders * senders)
+
+    def _send(self, send: Callable[[http.client.HTTPConnection], None], requests: int) -> None:
+        with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port)) as connection:
+            for _ in range(requests):
+                send(connection)
+
+
+def post(
+    connection: http.client.HTTPConnection, path: str, sent: bytes, headers: dict[str, str], expected: int
+) -> None:
+    connection.request("POST", path, sent, {"Content-Type": "application/json", **headers})
+    answer = connection.getresponse()
+    content = answer.read()
+    if answer.status != expected:
+        raise SystemExit(f"{path}: {answer.status} {content[:500]!r}")
 
 
 @contextlib.contextmanager
@@ -125,30 +136,41 @@ def servers(folder: str) -> Iterator[tuple[Server, Server, str]]:
             server.process.wait()
 
 
-def main() -> None:
+def measure(senders: int) -> None:
     with tempfile.TemporaryDirectory() as folder, servers(folder) as (echo, ours, key):
         headers = {"Authorization": f"Bearer {key}"}
-        numbers = iter(range(1, 1_000_000))
-        score_body = body(None)
+        bodies = (body(number) for number in itertools.count(1))
+        lock = threading.Lock()
+        plain = body(None)
+
+        def store(connection: http.client.HTTPConnection) -> None:
+            with lock:
+                sent = next(bodies)
+            post(connection, "/v1/impacts", sent, headers, 201)
+
         ways = {
-            "bare FastAPI echo": (echo, lambda: echo.post("/echo", score_body, {}, 200)),
-            "POST /v1/score, not stored": (ours, lambda: ours.post("/v1/score", score_body, headers, 200)),
-            "POST /v1/impacts, committed": (ours, lambda: ours.post("/v1/impacts", body(next(numbers)), headers, 201)),
+            "bare FastAPI echo": (echo, lambda c: post(c, "/echo", plain, {}, 200)),
+            "POST /v1/score, not stored": (ours, lambda c: post(c, "/v1/score", plain, headers, 200)),
+            "POST /v1/impacts, committed": (ours, store),
         }
         costs: dict[str, list[float]] = {name: [] for name in ways}
         for _ in range(ROUNDS + 1):
             for name, (server, send) in ways.items():
-                costs[name].append(server.cost(send))
-        echo_costs = costs["bare FastAPI echo"][1:]
-        print(f"{len(score_body)} bytes, {REQUESTS} requests a round, {ROUNDS} rounds in turn after one to warm up")
-        print("| request | CPU, median | ratio to echo, median (range) |")
-        print("|---|---|---|")
-        for name, found in costs.items():
-            ratios = sorted(a / b for a, b in zip(found[1:], echo_costs, strict=True))
-            middle = statistics.median(ratios)
-            cpu = statistics.median(found[1:]) * 1e6
-            print(f"| {name} | {cpu:.0f} us | {middle:.2f} ({ratios[0]:.2f} to {ratios[-1]:.2f}) |")
+                costs[name].append(server.cost(send, senders))
+    report(costs, senders)
+
+
+def report(costs: dict[str, list[float]], senders: int) -> None:
+    echo_costs = costs["bare FastAPI echo"][1:]
+    print(f"\n{senders} sender(s), {REQUESTS} requests a round, {ROUNDS} rounds in turn after one to warm up\n")
+    print("| request | CPU, median | ratio to echo, median (range) |")
+    print("|---|---|---|")
+    for name, found in costs.items():
+        ratios = sorted(a / b for a, b in zip(found[1:], echo_costs, strict=True))
+        cpu = statistics.median(found[1:]) * 1e6
+        print(f"| {name} | {cpu:.0f} us | {statistics.median(ratios):.2f} ({ratios[0]:.2f} to {ratios[-1]:.2f}) |")
 
 
 if __name__ == "__main__":
-    main()
+    for count in (1, 8):
+        measure(count)
