@@ -7,7 +7,7 @@ from enum import Enum
 
 from headimpact_service.errors import Problem
 
-READ = "CSV, JSON, NDJSON and NHTSA crash tests (zip)"
+READ = "CSV (also of DTS), JSON, NDJSON, and ISO-MME and NHTSA crash tests (zip)"
 
 
 class Kind(Enum):
@@ -17,6 +17,8 @@ class Kind(Enum):
     JSON = "json"
     NDJSON = "ndjson"
     CSV = "csv"
+    PARQUET = "parquet"
+    ARROW = "arrow"
 
 
 _BINARY = {

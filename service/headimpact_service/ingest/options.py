@@ -38,6 +38,7 @@ class ImportOptions:
     sample_rate_hz: float | None = None
     axes: AxesName | None = None
     low_pass: LowPass | None = None
+    fill_gaps: bool = False
     filename: str | None = None
     content_type: str | None = None
     max_impacts: int = MAX_IMPACTS
@@ -63,6 +64,7 @@ class ImportOptions:
             sample_rate_hz=reading.checked("sample_rate_hz", _RATE),
             axes=reading.checked("axes", _AXES),
             low_pass=reading.filter(),
+            fill_gaps=reading.flag("fill_gaps"),
             **known,
         )
         if reading.faults:
@@ -118,6 +120,13 @@ class _Reading:
             self._refuse("filter", payload_errors(error.errors(include_url=False, include_input=False), None))
             return None
         return low_pass(choice)
+
+    def flag(self, name: str) -> bool:
+        """A field that is true or false; not given, it is false."""
+        text = self.fields.get(name, "false")
+        if text not in {"true", "false"}:
+            self.faults.append(PayloadError(detail="true or false is needed.", code="wrong-type", parameter=name))
+        return text == "true"
 
     def instant(self) -> datetime | None:
         """The fields `occurred_at` and `time_zone`."""

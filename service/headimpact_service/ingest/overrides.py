@@ -30,6 +30,8 @@ def _recording(recording: Recording, options: ImportOptions) -> Recording:
         changes["axes"] = options.axes
     if options.low_pass is not None:
         changes["low_pass"] = options.low_pass
+    if options.fill_gaps:
+        changes["fill_gaps"] = True
     if options.sample_rate_hz is not None:
         changes |= {name: _at_rate(signal, options.sample_rate_hz) for name, signal in recording.signals()}
     return replace(recording, **changes) if changes else recording

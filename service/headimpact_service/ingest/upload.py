@@ -12,6 +12,9 @@ from pathlib import Path
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.csv_format import read_csv
 from headimpact_service.ingest.detect import HEAD, READ, Kind, detect
+from headimpact_service.ingest.dts import PRESET as DTS
+from headimpact_service.ingest.dts import is_dts, read_dts
+from headimpact_service.ingest.iso_mme import is_iso_mme, read_iso_mme
 from headimpact_service.ingest.json_format import read_json
 from headimpact_service.ingest.ndjson_format import read_ndjson
 from headimpact_service.ingest.nhtsa import is_nhtsa, read_nhtsa
@@ -53,6 +56,13 @@ def _values(record: ImpactRecord) -> int:
     return sum(signal.values.size for _, signal in record.recording.signals())
 
 
+def _read_csv(source: Source, options: ImportOptions) -> Impacts:
+    """A table, or a laboratory's rows of properties above its samples."""
+    if options.preset in {None, DTS} and (options.preset == DTS or is_dts(source.head(HEAD))):
+        return read_dts(source, options)
+    return read_csv(source, options)
+
+
 def _read_zip(source: Source, options: ImportOptions) -> Impacts:
     with source.open() as stream:
         archive = GuardedZip(stream)
@@ -64,11 +74,12 @@ def _read_zip(source: Source, options: ImportOptions) -> Impacts:
 
 
 READERS: dict[Kind, Callable[[Source, ImportOptions], Impacts]] = {
-    Kind.CSV: read_csv,
+    Kind.CSV: _read_csv,
     Kind.JSON: read_json,
     Kind.NDJSON: read_ndjson,
     Kind.ZIP: _read_zip,
 }
 ARCHIVES: tuple[tuple[Callable[[list[str]], bool], Callable[[GuardedZip, ImportOptions], Impacts]], ...] = (
     (is_nhtsa, read_nhtsa),
+    (is_iso_mme, read_iso_mme),
 )

@@ -43,6 +43,9 @@ class ImportQuery(Query):
     ] = Field(None, description="Samples per second [Hz].")
     axes: FieldText = Field(None, description="`anatomical` or `sae_j211`.")
     filter: FieldText = Field(None, description="`paper`, `none`, or JSON with a cut-off for each signal.")
+    fill_gaps: Annotated[str | None, Field(max_length=8), WithJsonSchema({"type": "boolean"})] = Field(
+        None, description="Fill gaps of at most 2 samples; otherwise a missing sample is refused."
+    )
     dry_run: Flag = Field(default=False, description="Show what is understood; store nothing.")
 
 
@@ -59,6 +62,7 @@ class ImportForm(BaseModel):
     sample_rate_hz: str = ""
     axes: str = ""
     filter: str = ""
+    fill_gaps: Literal["true", "false"] = "false"
     dry_run: Literal["true", "false"] = "false"
 
 
@@ -84,7 +88,7 @@ class PresetList(BaseModel):
     problems=("invalid-parameter", "unreadable-file", "import-too-large", "idempotency-conflict"),
 )
 async def import_file(call: Call) -> Response:
-    """CSV, JSON, NDJSON and NHTSA zip, told apart by their content.
+    """CSV (also of DTS), JSON, NDJSON, and zips of ISO-MME and NHTSA tests, told apart by their content.
 
     Up to 1000 impacts and 16 MiB are answered at once, unless `Prefer: respond-async` asks for a job; more is a job.
     An impact whose athlete, time and signals are stored already is `unchanged`, whatever the file is called.

@@ -29,7 +29,7 @@ class Preset(Strict):
     name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
     title: str
     source: str
-    format: Literal["table", "nhtsa"] = "table"
+    format: Literal["table", "nhtsa", "iso_mme", "dts"] = "table"
     recognised: bool = False
     requires: list[Requirement] = Field(default_factory=list)
     notes: list[str] = Field(default_factory=list)

@@ -1,0 +1,261 @@
+"""DTS / TDAS CSV: some twenty rows of ``key,value…`` with a value for each channel, then a column for each channel.
+
+The columns stand in the order of the rows above them. A column of times before them is not needed: the header says the
+rate, and how many points lie before the trigger. What the header says of filtering counts, not the last letter of the
+channel's code.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.curves import Curve, curve_fault
+from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
+from headimpact_service.ingest.headings import compact
+from headimpact_service.ingest.impact_json import MAX_SAMPLES
+from headimpact_service.ingest.iso_codes import HeadCode, head_code, unit_of
+from headimpact_service.ingest.iso_mme_files import NO_VALUE, NUMBER, decoded
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.source import Source
+from headimpact_service.ingest.table import Columns, FloatArray
+from headimpact_service.ingest.tabular import read_table
+
+PRESET = "dts"
+MAX_FILE = 64 * 1024 * 1024
+MAX_HEADER_ROWS = 200
+MAX_CHANNELS = 1024
+MAX_LINE = 256 * 1024
+
+# Keys without case, spaces and signs, by the beginning that all spellings share.
+_KEYS = {
+    "rate": ("samplerate", "samplingrate"),
+    "code": ("isochannelcode", "isocode"),
+    "unit": ("engineeringunit", "eu", "unit"),
+    "filter": ("softwarefilter",),
+    "name": ("channeldescription", "channelname", "description", "location"),
+    "before": ("prezero", "numberofprezero", "pretriggerp"),
+}
+_NUMBER = re.compile(NUMBER, re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    """The rows above the samples: cells by what they say."""
+
+    fields: dict[str, list[str]]
+    metadata: dict[str, str]
+
+    def of_channel(self, key: str, index: int) -> str:
+        """The channel's cell; a row with a single cell speaks for all channels."""
+        cells = self.fields.get(key, [])
+        if len(cells) == 1:
+            return cells[0]
+        return cells[index] if index < len(cells) else ""
+
+
+def is_dts(head: bytes) -> bool:
+    """Whether a text file begins with the rows of a DTS header: a rate and the channels' codes or units."""
+    rows = [line.split(_delimiter(line)) for line in decoded_head(head)[:MAX_HEADER_ROWS]]
+    told = {name for row in rows if (name := _key(row[0])) is not None and len(row) > 1}
+    return "rate" in told and "code" in told
+
+
+def decoded_head(head: bytes) -> list[str]:
+    """The whole lines of a file's beginning, in any of the encodings that laboratories use."""
+    text = head.decode("latin-1")
+    return [line.strip() for line in text.split("\n")]
+
+
+def read_dts(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+    """The head impacts of a file: one for each test object and position whose head has channels.
+
+    With a mapping, its columns are found by the channels' codes or names, and the header gives rate and trigger.
+    """
+    rows = _rows(source)
+    header, first = _header(rows)
+    data = _Data(header, rows[first:])
+    if options.mapping is not None:
+        yield from _mapped(data, options)
+        return
+    channels = [channel for index in range(data.channels) if (channel := data.channel(index)) is not None]
+    if not channels:
+        raise Problem(
+            "unreadable-file",
+            "No channel of the file has the ISO code of a head's centre of gravity: send a mapping from the channels' "
+            "codes or names to signals.",
+        )
+    metadata = {"format": "dts", "preset": PRESET, **header.metadata}
+    found = head_impacts(
+        channels, options, preset=PRESET, metadata=metadata, trigger_known=data.points_before is not None
+    )
+    for count, item in enumerate(found, start=1):
+        if count > options.max_impacts:
+            raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
+        yield item
+
+
+def _rows(source: Source) -> list[list[str]]:
+    lines = decoded(source.read(MAX_FILE)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    if any(len(line) > MAX_LINE or "\0" in line for line in lines):
+        raise Problem("unreadable-file", f"A line may have at most {MAX_LINE} characters, and no NUL among them.")
+    if len(lines) > MAX_HEADER_ROWS + MAX_SAMPLES + 100:
+        raise curve_fault(f"A file may hold at most {MAX_SAMPLES} samples.", "sample-count")
+    wanted = next((line for line in lines[:MAX_HEADER_ROWS] if _key(re.split(r"[,;\t]", line)[0]) == "code"), lines[0])
+    try:
+        found = list(csv.reader(lines, delimiter=_delimiter(wanted), strict=True))
+    except csv.Error:
+        raise Problem("unreadable-file", "The file's quotes do not match.") from None
+    return [[cell.strip() for cell in row] for row in found if any(cell.strip() for cell in row)]
+
+
+def _delimiter(line: str) -> str:
+    return max(",;\t", key=line.count)
+
+
+def _header(rows: Sequence[Sequence[str]]) -> tuple[_Header, int]:
+    """The rows that begin with words, and the first that does not."""
+    fields: dict[str, list[str]] = {}
+    metadata: dict[str, str] = {}
+    for number, row in enumerate(rows[:MAX_HEADER_ROWS]):
+        if _NUMBER.fullmatch(row[0] or next(filter(None, row))) is not None:
+            return _Header(fields, metadata), number
+        name = _key(row[0])
+        if name is not None:
+            fields.setdefault(name, _without_empty_end(row[1:]))
+        elif compact(row[0]).startswith("test") and len(row) > 1 and row[1]:
+            metadata.setdefault("_".join(re.findall(r"[a-z]+", row[0].lower()))[:40], row[1][:200])
+    raise Problem("unreadable-file", f"The first {MAX_HEADER_ROWS} rows of the file hold no sample.")
+
+
+def _key(cell: str) -> str | None:
+    plain = compact(cell.strip().strip('"'))
+    return next((name for name, spellings in _KEYS.items() if plain.startswith(spellings)), None)
+
+
+def _without_empty_end(cells: Sequence[str]) -> list[str]:
+    kept = list(cells)
+    while kept and not kept[-1]:
+        kept.pop()
+    return kept
+
+
+class _Data:
+    """The samples, by channel."""
+
+    def __init__(self, header: _Header, rows: Sequence[Sequence[str]]) -> None:
+        """Look at the header only; columns are read as they are asked for."""
+        self.header = header
+        codes = header.fields.get("code", [])
+        names = header.fields.get("name", [])
+        self.channels = max(len(codes), len(names), len(header.fields.get("unit", [])))
+        if not 1 <= self.channels <= MAX_CHANNELS:
+            raise Problem("unreadable-file", f"A file may have 1 to {MAX_CHANNELS} channels.")
+        self.rows = [_without_empty_end(row) for row in rows]
+        self.first = self._first_column()
+        self.rate = self._number("rate", "The sample rate")
+        before = header.of_channel("before", 0)
+        self.points_before = self._number("before", "The number of points before the trigger") if before else None
+        if self.rate is None or self.rate <= 0.0:
+            raise curve_fault("The header gives no sample rate.", "rate-missing")
+
+    def _first_column(self) -> int:
+        """The column of the first channel: one stands before it where the rows are one cell longer."""
+        width = max((len(row) for row in self.rows), default=0)
+        if width not in {self.channels, self.channels + 1}:
+            raise Problem(
+                "unreadable-file",
+                f"The rows of samples must have {self.channels} cells, one for each channel, or one more for the time.",
+            )
+        return width - self.channels
+
+    def _number(self, key: str, what: str) -> float | None:
+        """A number that all channels share."""
+        cells = set(filter(None, self.header.fields.get(key, [])))
+        if not cells:
+            return None
+        numbers = {float(cell) for cell in cells if _NUMBER.fullmatch(cell)}
+        if len(numbers) != 1 or not all(_NUMBER.fullmatch(cell) for cell in cells):
+            raise curve_fault(f"{what} must be one number for all channels.", "rates-differ")
+        return numbers.pop()
+
+    def channel(self, index: int) -> HeadChannel | None:
+        """The channel of a column, if it is one of a head's."""
+        code = head_code(self.header.of_channel("code", index)) if "code" in self.header.fields else None
+        if code is None:
+            return None
+        return HeadChannel(code, self.named(index), partial(self._curve, code, index), self._filtering(index, code))
+
+    def named(self, index: int) -> str:
+        """The channel as messages name it."""
+        return f"{self.header.of_channel('code', index)[:40]} (channel {index + 1})"
+
+    def _filtering(self, index: int, code: HeadCode) -> str:
+        said = self.header.of_channel("filter", index)
+        return said[:40].lower() if said else code.filtering
+
+    def _curve(self, code: HeadCode, index: int) -> Curve:
+        unit = unit_of(code.signal, self.header.of_channel("unit", index))
+        if unit is None:
+            raise curve_fault(f"The unit of {self.named(index)} is none that is known for it.", "unit-missing")
+        values = self.values(index)
+        rate = float(self.rate or 0.0)
+        stamps: FloatArray = (np.arange(values.size, dtype=np.float64) - (self.points_before or 0.0)) / rate
+        return Curve(code.axis, unit, values, stamps, rate)
+
+    def values(self, index: int) -> FloatArray:
+        """The samples of a channel; NaN where a cell is empty or says that there is no value."""
+        column = index + self.first
+        cells = [row[column] if column < len(row) else "" for row in self.rows]
+        if not 3 <= len(cells) <= MAX_SAMPLES:
+            raise curve_fault(f"The file must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
+        return np.array([self._value(cell, index, sample) for sample, cell in enumerate(cells)])
+
+    def _value(self, cell: str, index: int, sample: int) -> float:
+        if _NUMBER.fullmatch(cell) is not None:
+            return float(cell)
+        if not cell or cell.upper() in {NO_VALUE, "NAN"}:
+            return float("nan")
+        raise curve_fault(f"{self.named(index)} holds what is no number at sample {sample}.", "missing-sample")
+
+
+class _Channels:
+    """The channels as a table, for a mapping that names them."""
+
+    parted = False
+
+    def __init__(self, data: _Data) -> None:
+        """Headings are the channels' codes or, where they have none, their names."""
+        self._data = data
+        self.headings = tuple(self._heading(index) for index in range(data.channels))
+        self.units: Mapping[int, str] = {i: data.header.of_channel("unit", i) for i in range(data.channels)}
+
+    def _heading(self, index: int) -> str:
+        header = self._data.header
+        return header.of_channel("code", index) or header.of_channel("name", index) or f"channel {index + 1}"
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
+        """All rows at once: a file holds one record."""
+        rows = len(self._data.rows)
+        words = {index: [""] * rows for index in texts}
+        yield Columns(rows=rows, numbers={index: self._data.values(index) for index in numbers}, texts=words)
+
+
+def _mapped(data: _Data, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+    asked = options.mapping
+    assert asked is not None
+    known: dict[str, Any] = {"sample_rate_hz": data.rate, "axes": "sae_j211"}
+    if data.points_before is not None and data.rate:
+        known["pre_trigger_ms"] = round(data.points_before / data.rate * 1000.0, 9)
+    given = {name: value for name, value in known.items() if name not in asked.model_fields_set}
+    mapping = asked.model_copy(update=given)
+    table = _Channels(data)
+    return read_table(table, replace(options, preset=None, mapping=mapping), format_name="dts")

@@ -1,0 +1,169 @@
+"""Channels with ISO codes into impacts: one for each head that has any, whatever file format they came in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from headimpact.filtering import PAPER
+from headimpact.quality import QualityNote, check_reported_resultant, words
+from headimpact.recording import AXES, SIGNALS, SignalName
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.curves import Curve, curve_fault, head_recording
+from headimpact_service.ingest.impact_reading import low_pass
+from headimpact_service.ingest.iso_codes import RESULTANT, HeadCode
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.overrides import with_options
+from headimpact_service.ingest.presets import preset_named
+from headimpact_service.ingest.record import ImpactRecord
+
+
+@dataclass(frozen=True, slots=True)
+class HeadChannel:
+    """One channel of a head.
+
+    `invalid` says why its laboratory does not let its data stand, `doubt` why it has doubts, `filtering` what was
+    filtered before, `points` how many samples it should have; `read` gives them.
+    """
+
+    code: HeadCode
+    named: str
+    read: Callable[[], Curve]
+    filtering: str
+    invalid: str | None = None
+    doubt: str | None = None
+    points: float | None = None
+
+
+def head_impacts(
+    channels: Sequence[HeadChannel],
+    options: ImportOptions,
+    *,
+    preset: str,
+    metadata: dict[str, Any],
+    notes: Sequence[QualityNote] = (),
+    trigger_known: bool = True,
+) -> Iterator[ImpactRecord | Problem]:
+    """The impacts of one test, by test object and position."""
+    for head in sorted({channel.code.head for channel in channels}):
+        mine = [channel for channel in channels if channel.code.head == head]
+        reading = _Head(mine, options, preset, trigger_known=trigger_known)
+        try:
+            yield with_options(reading.record(metadata | _place(head), notes), options)
+        except Problem as problem:
+            yield problem
+
+
+def _place(head: str) -> dict[str, str]:
+    return {"test_object": head[0], "position": head[1]}
+
+
+class _Head:
+    """One head's channels."""
+
+    def __init__(
+        self, channels: Sequence[HeadChannel], options: ImportOptions, preset: str, *, trigger_known: bool
+    ) -> None:
+        self.channels, self.options, self.preset, self.trigger_known = channels, options, preset, trigger_known
+        self.notes: list[QualityNote] = []
+        self.reasons: list[str] = []
+        self.used: list[HeadChannel] = []
+
+    def record(self, metadata: dict[str, Any], notes: Sequence[QualityNote]) -> ImpactRecord:
+        """The head's record; with no signal that has its three axes, one that must not be scored."""
+        found = {name: curves for name in SIGNALS if (curves := self._curves(name))}
+        if not found:
+            raise curve_fault("The head has a resultant only: its three axes are needed.", "no-signal")
+        whole = {name: curves for name, curves in found.items() if len(curves) == len(AXES)}
+        for name in found:
+            if name not in whole:
+                self._say_incomplete(name, found[name], alone=not whole)
+        mapping = preset_named(self.preset).mapping
+        recording = head_recording(
+            whole or found,
+            axes=mapping.axes or "sae_j211",
+            low_pass=PAPER if mapping.filter is None else low_pass(mapping.filter),
+            trigger_known=self.trigger_known,
+            fill_gaps=self.options.fill_gaps,
+        )
+        for name, signal in recording.signals():
+            self._require_whole(name, found[name])
+            self._compare_resultant(name, signal.unit, signal.values)
+        return ImpactRecord(
+            recording=recording,
+            metadata=metadata | self._used(),
+            notes=(*notes, *self.notes),
+            unscorable=tuple(self.reasons),
+        )
+
+    def _curves(self, signal: SignalName) -> list[Curve]:
+        """The signal's curves, one an axis, as far as they are there."""
+        curves = []
+        for channel in self._chosen(signal):
+            curve = channel.read()
+            self.used.append(channel)
+            curves.append(curve)
+            self._say_status(channel, curve)
+        return curves
+
+    def _say_status(self, channel: HeadChannel, curve: Curve) -> None:
+        """What its laboratory says of a channel, and whether it is as long as it should be."""
+        if channel.invalid is not None:
+            self.reasons.append(f"Its laboratory marked {channel.named} as not valid ({channel.invalid}).")
+        if channel.doubt is not None:
+            self._note("questionable_data", f"Its laboratory says of {channel.named}: {channel.doubt}.", channel)
+        if channel.points is not None and channel.points != curve.values.size:
+            detail = f"{channel.named} has {curve.values.size} samples where its header says {channel.points:g}."
+            self._note("sample_count_mismatch", detail, channel)
+
+    def _chosen(self, signal: SignalName) -> list[HeadChannel]:
+        """One channel an axis: of one filter where one has all three, the weakest; a valid one before an invalid."""
+        mine = [c for c in self.channels if c.code.signal == signal and c.code.axis != RESULTANT]
+        axes_of = {f: {c.code.axis for c in mine if c.code.strength == f} for f in {c.code.strength for c in mine}}
+        best: dict[str, HeadChannel] = {}
+        for channel in sorted(mine, key=lambda c: (len(axes_of[c.code.strength]) < 3, _rank(c))):
+            best.setdefault(channel.code.axis, channel)
+        return [best[axis] for axis in AXES if axis in best]
+
+    def _say_incomplete(self, signal: SignalName, curves: Sequence[Curve], *, alone: bool) -> None:
+        present = ", ".join(curve.axis for curve in curves)
+        absent = ", ".join(axis for axis in AXES if axis not in {curve.axis for curve in curves})
+        detail = f"The head's {words(signal)} has {present} but not {absent}"
+        if alone:
+            self.reasons.append(f"{detail}: no signal has its three axes.")
+        else:
+            self.notes.append(QualityNote("channel_missing", "warning", f"{detail}: it was left out.", signal))
+
+    def _require_whole(self, signal: SignalName, curves: Sequence[Curve]) -> None:
+        """Refuse a sample that the laboratory has no value for, where the record is to be scored and as it is."""
+        if self.options.fill_gaps or self.reasons:
+            return
+        for curve in curves:
+            missing = np.flatnonzero(np.isnan(curve.values))
+            if missing.size:
+                detail = f"The {words(signal)} {curve.axis} has no value at sample {missing[0]}."
+                raise curve_fault(detail, "missing-sample")
+
+    def _compare_resultant(self, signal: SignalName, unit: str, values: np.ndarray[Any, np.dtype[np.float64]]) -> None:
+        """The resultant that the file supplies, against the one of its samples."""
+        for channel in self.channels:
+            if channel.code.signal != signal or channel.code.axis != RESULTANT:
+                continue
+            curve = channel.read()
+            if curve.unit == unit and curve.values.size == values.shape[0]:
+                self.notes += check_reported_resultant(signal, unit, curve.values, values)
+
+    def _note(self, code: str, detail: str, channel: HeadChannel) -> None:
+        self.notes.append(QualityNote(code, "warning", detail, channel.code.signal, channel.code.axis))
+
+    def _used(self) -> dict[str, Any]:
+        names = {f"{c.code.signal}_{c.code.axis}": c.code.code for c in self.used}
+        filters = {f"{c.code.signal}_{c.code.axis}": c.filtering for c in self.used}
+        return {"channels": names, "filtered_before": filters}
+
+
+def _rank(channel: HeadChannel) -> tuple[bool, int, str]:
+    return channel.invalid is not None, channel.code.strength, channel.code.code

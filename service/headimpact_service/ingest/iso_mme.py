@@ -1,0 +1,213 @@
+"""ISO-MME (ISO/TS 13499): a folder as zip, ``<test>.mme``, ``Channel/<test>.chn`` and a file for each channel."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import datetime
+from functools import partial
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from headimpact.quality import QualityNote
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.curves import Curve, curve_fault
+from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
+from headimpact_service.ingest.headings import compact
+from headimpact_service.ingest.iso_codes import HeadCode, head_code, is_time, unit_of
+from headimpact_service.ingest.iso_mme_files import Header, listed_channels, read_channel, read_header
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.stamps import nominal_rate
+from headimpact_service.ingest.table import FloatArray
+from headimpact_service.ingest.times import TimeError, instant
+from headimpact_service.ingest.zip_guard import GuardedZip
+
+PRESET = "iso_mme"
+MAX_CHANNELS = 2000
+MAX_NAMED = 10
+"""Absent channels that a note names; of more it says how many."""
+
+_NUMBERED = re.compile(r"\.([0-9]{3,4})$")
+_ENDINGS = (".mme", ".chn")
+# What a header's status says of the data (ISO/TS 13499, RED A).
+_INVALID = frozenset({"channel failed", "meaningless data", "no data", "system failed"})
+_DOUBTFUL = frozenset({"questionable data", "data questionable", "questionable", "system questionable"})
+_TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "usec": 1e-6}
+_METADATA = {
+    "test_number": "test number",
+    "laboratory": "laboratory name",
+    "test_type": "test type",
+    "test_date": "test date",
+    "time_of_test": "time of test",
+}
+
+
+def is_iso_mme(names: list[str]) -> bool:
+    """Whether an archive's files are those of an ISO-MME set."""
+    return any(name.lower().endswith(_ENDINGS) for name in names)
+
+
+def read_iso_mme(archive: GuardedZip, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+    """The head impacts of the tests in an archive: one for each test object and position whose head has channels."""
+    if options.mapping is not None or options.preset not in {None, PRESET}:
+        raise Problem("unreadable-file", "An ISO-MME set is read by the preset iso_mme and takes no mapping.")
+    count = 0
+    for folder in _folders(archive.names):
+        test = _Test(archive, folder, options)
+        for item in test.impacts():
+            count += 1
+            if count > options.max_impacts:
+                raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
+            yield item
+    if count == 0:
+        raise Problem("unreadable-file", "The ISO-MME set has no channel at a head's centre of gravity.")
+
+
+def _folders(names: list[str]) -> list[PurePosixPath]:
+    """The folders of the tests: those of the ``.mme`` files, or above the ``.chn`` files where there is none."""
+    paths = [PurePosixPath(name) for name in names]
+    found = {path.parent for path in paths if path.suffix.lower() == ".mme"}
+    if not found:
+        lists = (path.parent for path in paths if path.suffix.lower() == ".chn")
+        found = {folder.parent if folder.name.lower() == "channel" else folder for folder in lists}
+    return sorted(found)
+
+
+class _Test:
+    """One test: its headers, its list of channels, and the files of these."""
+
+    def __init__(self, archive: GuardedZip, folder: PurePosixPath, options: ImportOptions) -> None:
+        self.archive, self.folder, self.options = archive, folder, options
+        self.info = self._read_header(".mme", [folder])
+        inside = [path for path in map(PurePosixPath, archive.names) if path.parent == folder]
+        channels = [p for p in map(PurePosixPath, archive.names) if _is_channel_folder(p.parent, folder)] or inside
+        self.files = {int(m[1]): str(p) for p in channels if (m := _NUMBERED.search(p.name)) is not None}
+        if len(self.files) > MAX_CHANNELS:
+            raise Problem("unreadable-file", f"A set may have at most {MAX_CHANNELS} channels.")
+        self.listed = listed_channels(self._read_header(".chn", [path.parent for path in channels] or [folder]))
+        self.read: dict[int, tuple[Header, FloatArray]] = {}
+
+    def impacts(self) -> Iterator[ImpactRecord | Problem]:
+        """The heads of this test."""
+        metadata = {"format": "iso_mme", "preset": PRESET, **self._metadata()}
+        channels = [c for number in sorted(self.files) if (c := self._channel(number)) is not None]
+        occurred_at = self._occurred_at()
+        options = self.options
+        for item in head_impacts(channels, options, preset=PRESET, metadata=metadata, notes=self._absent()):
+            if isinstance(item, Problem) or occurred_at is None or options.occurred_at is not None:
+                yield item
+            else:
+                yield replace(item, occurred_at=occurred_at)
+
+    def _read_header(self, ending: str, folders: list[PurePosixPath]) -> Header:
+        for name in self.archive.names:
+            path = PurePosixPath(name)
+            if path.suffix.lower() == ending and path.parent in folders:
+                return read_header(self.archive.read(name))
+        return Header({})
+
+    def _channel(self, number: int) -> HeadChannel | None:
+        """The channel of a file, if it is one of a head's; a file that the list calls something else is not opened."""
+        if number in self.listed and head_code(self.listed[number]) is None:
+            return None
+        header, _ = self._file(number)
+        code = head_code(header.text("channel code") or self.listed.get(number, ""))
+        if code is None:
+            return None
+        status = (header.text("data status") or "").casefold()
+        return HeadChannel(
+            code=code,
+            named=_named(code, number),
+            read=partial(self._curve, code, number),
+            filtering=code.filtering,
+            invalid=status if status in _INVALID else None,
+            doubt=status if status in _DOUBTFUL else None,
+            points=header.number("number of samples"),
+        )
+
+    def _file(self, number: int) -> tuple[Header, FloatArray]:
+        if number not in self.read:
+            named = f"channel {number:03d}"
+            self.read[number] = read_channel(self.archive.read(self.files[number]), named)
+        return self.read[number]
+
+    def _curve(self, code: HeadCode, number: int) -> Curve:
+        header, values = self._file(number)
+        unit = unit_of(code.signal, header.text("unit"))
+        if unit is None:
+            raise curve_fault(f"The unit of {_named(code, number)} is none that is known for it.", "unit-missing")
+        stamps, rate = self._stamps(header, values.size, _named(code, number))
+        full_scale = header.number("channel amplitude class")
+        return Curve(code.axis, unit, values, stamps, rate, full_scale if full_scale and full_scale > 0 else None)
+
+    def _stamps(self, header: Header, count: int, named: str) -> tuple[FloatArray, float | None]:
+        """The channel's times [s] and their rate: implicit in its header, or those of the channel that it refers to."""
+        first, step = header.number("time of first sample"), header.number("sampling interval")
+        if first is not None and step is not None and 0.0 < step < 1.0:
+            stamps: FloatArray = first + step * np.arange(count, dtype=np.float64)
+        else:
+            stamps = self._reference(header, count, named)
+        if not (np.diff(stamps) > 0).all():
+            raise curve_fault(f"The times of {named} must increase.", "time-not-increasing")
+        return stamps, nominal_rate(stamps)
+
+    def _reference(self, header: Header, count: int, named: str) -> FloatArray:
+        wanted = (header.text("reference channel name") or "").partition("/")[0].strip().upper()
+        for number in sorted(self.files):
+            if wanted and is_time(wanted) and self.listed.get(number, wanted).upper() == wanted:
+                found, stamps = self._file(number)
+                if (found.text("channel code") or wanted).upper() == wanted:
+                    return _in_seconds(found, stamps, count, named)
+        raise curve_fault(
+            f"The times of {named} are neither in its header nor in a channel of the set that it names.", "time-missing"
+        )
+
+    def _absent(self) -> list[QualityNote]:
+        """What the list names and the set does not hold."""
+        absent = {number: code for number, code in self.listed.items() if number not in self.files}
+        if not absent:
+            return []
+        heads = [number for number, code in absent.items() if head_code(code) is not None]
+        named = [
+            f"{absent[number]} (channel {number:03d})" for number in [*heads, *(n for n in absent if n not in heads)]
+        ]
+        more = f" and {len(named) - MAX_NAMED} more" if len(named) > MAX_NAMED else ""
+        detail = f"The set lists {', '.join(named[:MAX_NAMED])}{more} but does not hold them."
+        if heads:
+            return [QualityNote("channel_missing", "warning", detail)]
+        return [QualityNote("channel_missing", "note", f"{detail} None is of the head's centre of gravity.")]
+
+    def _metadata(self) -> dict[str, Any]:
+        told = {name: self.info.text(key) for name, key in _METADATA.items()}
+        return {name: value for name, value in told.items() if value is not None}
+
+    def _occurred_at(self) -> datetime | None:
+        """When the test was, where the sender says in which zone its laboratory's clock runs."""
+        date, time = self.info.text("test date"), self.info.text("time of test")
+        if date is None or time is None or self.options.time_zone is None:
+            return None
+        try:
+            return instant(f"{date}T{time}", self.options.time_zone)
+        except TimeError:
+            return None
+
+
+def _is_channel_folder(folder: PurePosixPath, test: PurePosixPath) -> bool:
+    return folder.name.lower() == "channel" and folder.parent == test
+
+
+def _named(code: HeadCode, number: int) -> str:
+    return f"{code.code} (channel {number:03d})"
+
+
+def _in_seconds(header: Header, stamps: FloatArray, count: int, named: str) -> FloatArray:
+    factor = _TIME_UNITS.get(compact(header.text("unit") or ""))
+    if factor is None:
+        raise curve_fault(f"The unit of the times of {named} is neither s, ms nor µs.", "unit-missing")
+    if stamps.size != count or not np.isfinite(stamps).all():
+        raise curve_fault(f"The times of {named} must be as many as its samples: {count}.", "stamp-count")
+    return stamps * factor

@@ -1,0 +1,146 @@
+"""DTS / TDAS exports: the header says what the columns are, at which rate, and how they were filtered."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ingest_files import codes, csv_text, half_sine, one, outcome, read, refused, statuses
+from laboratory import DTS_COLUMNS, SAMPLES, dts
+
+from headimpact.preparation import prepare
+from headimpact_service.ingest.dts import is_dts
+from headimpact_service.ingest.mapping import Mapping
+
+EXPECTED = {"linear_acceleration": [30.0, -12.0, 7.5], "angular_velocity": np.degrees([8.0, 20.0, -4.0])}
+
+
+def peaks(record, signal: str) -> list[float]:
+    values = getattr(record.recording, signal).values
+    return [float(column[np.abs(column).argmax()]) for column in values.T]
+
+
+@pytest.mark.parametrize("time_column", [True, False])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("named", [None, "dts"])
+def test_channels_are_read_in_the_order_of_the_header_whatever_that_is(time_column, delimiter, named):
+    record = one(dts(time_column=time_column, delimiter=delimiter), preset=named)
+    recording = record.recording
+    for signal, expected in EXPECTED.items():
+        assert peaks(record, signal) == pytest.approx(expected)
+    assert (recording.linear_acceleration.unit, recording.angular_velocity.unit) == ("g", "deg/s")
+    assert recording.linear_acceleration.sample_rate_hz == 20_000.0
+    assert (recording.axes, recording.pre_trigger_ms) == ("sae_j211", 0.5)
+    assert record.metadata["test_id"] == "drop 7"
+    assert prepare(recording).kinematics.samples == SAMPLES
+
+
+def test_the_header_s_filter_counts_not_the_code_s_last_letter():
+    assert one(dts()).metadata["filtered_before"]["linear_acceleration_x"] == "none"
+    told = dts(changes={"Software Filter": ["CFC 180"] * 6})
+    assert one(told).metadata["filtered_before"]["linear_acceleration_x"] == "cfc 180"
+    silent = dts(changes={"Software Filter": []})
+    assert one(silent).metadata["filtered_before"]["linear_acceleration_x"] == "CFC180"
+
+
+def test_a_value_that_is_given_once_is_that_of_every_channel():
+    once = dts(changes={"Sample Rate (Hz)": ["10000"], "Pre-zero Data Pts": ["20"], "Software Filter": ["NONE"]})
+    recording = one(once).recording
+    assert recording.angular_velocity.sample_rate_hz == 10_000.0
+    assert recording.pre_trigger_ms == 2.0
+
+
+def test_without_points_before_the_trigger_the_trigger_is_not_known():
+    assert one(dts(before=None)).recording.pre_trigger_ms is None
+
+
+def test_a_row_of_codes_may_leave_a_cell_for_the_time():
+    text = dts()
+    lines = [
+        f"{line.partition(',')[0]},,{line.partition(',')[2]}" if i < 12 else line
+        for i, line in enumerate(text.split("\r\n"))
+    ]
+    assert peaks(one("\r\n".join(lines)), "linear_acceleration") == pytest.approx(EXPECTED["linear_acceleration"])
+
+
+def test_two_heads_of_one_file_are_two_impacts():
+    columns = DTS_COLUMNS | {"13" + code[2:]: (unit, 2 * peak) for code, (unit, peak) in DTS_COLUMNS.items()}
+    first, second = read(dts(columns))
+    assert peaks(first, "linear_acceleration")[0] == 30.0
+    assert peaks(second, "linear_acceleration")[0] == 60.0
+
+
+def test_other_channels_of_the_file_are_passed_over():
+    columns = {"11CHST0000H3ACXC": ("g", 99.0), **DTS_COLUMNS, "": ("V", 1.0)}
+    assert peaks(one(dts(columns)), "linear_acceleration")[0] == 30.0
+
+
+def test_channels_without_iso_codes_are_read_with_a_mapping_by_their_names():
+    plain = {f"X{n}": pair for n, pair in enumerate(DTS_COLUMNS.values())}
+    file = dts(plain)
+    assert "ISO code" in refused(file).detail
+    mapping = Mapping.model_validate(
+        {
+            "linear_acceleration": {"unit": "g", "x": "X3", "y": "X4", "z": "X5"},
+            "angular_velocity": {"unit": "deg/s", "x": "X2", "y": "X1", "z": "X0"},
+        }
+    )
+    for named in (None, "dts"):
+        record = one(file, mapping=mapping, preset=named)
+        assert peaks(record, "angular_velocity") == pytest.approx(EXPECTED["angular_velocity"])
+        assert (record.recording.axes, record.recording.pre_trigger_ms) == ("sae_j211", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"Sample Rate (Hz)": ["fast"] * 6}, "rates-differ"),
+        ({"Sample Rate (Hz)": ["20000"] * 5 + ["10000"]}, "rates-differ"),
+        ({"Sample Rate (Hz)": ["0"] * 6}, "rate-missing"),
+        ({"Engineering Unit": ["furlong"] * 6}, "unit-missing"),
+        ({"Engineering Unit": ["deg/s"] * 3 + ["g", "g", "m/s^2"]}, "units-differ"),
+    ],
+)
+def test_a_header_that_contradicts_itself_is_refused(changes, code):
+    assert codes(refused(dts(changes=changes))) == [(None, code)]
+
+
+def test_a_missing_value_is_422_with_its_place_and_filled_where_that_is_asked_for():
+    lines = dts().split("\r\n")
+    cells = lines[20].split(",")
+    lines[20] = ",".join([*cells[:4], "", *cells[5:]])
+    problem = refused("\r\n".join(lines))
+    assert codes(problem) == [(None, "missing-sample")]
+    assert "linear acceleration x has no value at sample 7" in problem.detail
+    assert prepare(one("\r\n".join(lines), fill_gaps=True).recording).notes[0].code == "gaps_filled"
+    lines[20] = ",".join([*cells[:4], "1,5x", *cells[5:]])
+    assert refused("\r\n".join(lines)).status == 422
+
+
+def test_a_table_is_no_dts_file():
+    assert not is_dts(csv_text().encode())
+    assert not is_dts(b"Sample Num,Linear Acc x g\n1,2\n")
+    assert is_dts(dts().encode())
+
+
+def test_the_length_is_bounded():
+    row = "0," * 5 + "0\r\n"
+    assert codes(refused(dts(time_column=False) + row * 20_001)) == [(None, "sample-count")]
+    head = "\r\n".join(dts().split("\r\n")[:13])
+    assert refused(head).status == 422
+
+
+@given(st.dictionaries(st.integers(0, 3000), st.binary(max_size=4), min_size=1, max_size=6))
+@settings(max_examples=80, deadline=None)
+def test_any_damage_is_read_or_refused(damage):
+    data = bytearray(dts().encode())
+    for place, junk in damage.items():
+        data[place : place + len(junk)] = junk
+    assert statuses(outcome(bytes(data), preset="dts")) <= {413, 415, 422}
+    assert statuses(outcome(bytes(data))) <= {413, 415, 422}
+
+
+def test_a_wave_of_each_channel_is_its_own():
+    recording = one(dts()).recording
+    np.testing.assert_allclose(recording.angular_velocity.values[:, 2], half_sine(SAMPLES, np.degrees(-4.0)))
