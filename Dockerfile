@@ -41,7 +41,7 @@ RUN sed '/^$/,$d; s/^Suites:.*/Suites: forky/' /etc/apt/sources.list.d/debian.so
 COPY --from=build /opt/headimpact /opt/headimpact
 RUN install --directory --owner 10001 --group 10001 --mode 0700 /data
 
-# The root may be read-only: the database in /data is all that is written (uploads are bounded and stay in memory).
+# The root may be read-only: the database, and beside it the uploads that wait for a job, are all that is written.
 ENV PATH=/opt/headimpact/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     PYTHONUNBUFFERED=1 \
