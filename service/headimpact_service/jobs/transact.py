@@ -58,7 +58,6 @@ class Transact:
             "application_version": VERSION,
             "executor_id": executor,
             "log_level": "WARNING",
-            "notification_listener_polling_interval_sec": 10.0,
         }
         self._executor = executor
         DBOS(config=config)
