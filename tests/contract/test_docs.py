@@ -209,6 +209,20 @@ def test_decisions_are_numbered_without_a_gap_and_listed_by_their_titles() -> No
     assert titles == [page.read_text("utf-8").splitlines()[0] for page in pages]
 
 
+def test_the_first_decision_shows_the_order_of_imports_that_is_held() -> None:
+    (shown,) = blocks("docs/adr/0001-two-source-roots.md")
+    (contract,) = [c for c in PYPROJECT["tool"]["importlinter"]["contracts"] if c["type"] == "layers"]
+    held = " -> ".join(contract["layers"]).replace("headimpact_service.", "")
+    assert shown.split() == held.split()
+
+
+def test_every_page_that_code_points_to_exists() -> None:
+    for file in tracked():
+        if file.suffix in {".py", ".toml", ".html"}:
+            for page in re.findall(r"\bdocs/[\w/-]+\.md\b", file.read_text("utf-8")):
+                assert (ROOT / page).is_file(), f"{name_of(file)} points to {page}"
+
+
 DECISIONS = [
     (re.sub(r"\[(\d+)\].*", r"\1", number), title)
     for line in text("docs/adr/README.md").splitlines()
