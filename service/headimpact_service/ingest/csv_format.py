@@ -69,8 +69,9 @@ class CsvTable:
         self._line = 0
         heading = self._first_line(skip_rows)
         self._delimiter = _delimiter(heading)
-        self._reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
-        self.headings: tuple[str, ...] = tuple(self._rows(self._reader, 1)[0])
+        reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
+        self.headings: tuple[str, ...] = tuple(self._rows(reader, 1)[0])
+        self._simply_quoted = _simply_quoted(self._delimiter)
         if len(self.headings) > MAX_COLUMNS:
             raise _unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
 
@@ -94,19 +95,24 @@ class CsvTable:
 
     def _blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
         """Some thousand rows at a time: the number columns as one array, the text columns as lists."""
-        if self._quoted:
-            while rows := self._rows(self._reader, ROWS_AT_ONCE):
-                yield self._careful(rows, numbers, texts)
-            return
         self._line += 1
         while lines := list(islice(self._lines, ROWS_AT_ONCE)):
-            yield self._fast(lines, numbers, texts) or self._careful(
-                self._rows(csv.reader(lines, delimiter=self._delimiter, strict=True), len(lines)), numbers, texts
-            )
+            yield self._fast(lines, numbers, texts) or self._careful(self._parsed(lines), numbers, texts)
             self._line += len(lines)
 
+    def _parsed(self, lines: list[str]) -> list[list[str]]:
+        """The cells of some lines, and of the further lines on which a quoted cell of theirs goes on."""
+        reader = csv.reader(chain(lines, self._lines), delimiter=self._delimiter, strict=True)
+        rows = self._rows(reader, len(lines))
+        self._line += reader.line_num - len(lines)
+        return rows
+
     def _fast(self, lines: list[str], numbers: Sequence[int], texts: Sequence[int]) -> Block | None:
-        """A block without quotes, a line a row, by NumPy's own reader; None where a line is not as plain as that."""
+        """A block in which a line is a row, by NumPy's own reader; None where a line is not as plain as that."""
+        if self._quoted:
+            lines = [self._simply_quoted.sub(r"\1", line) if '"' in line else line for line in lines]
+            if any('"' in line for line in lines):
+                return None
         cuts = {line.count(self._delimiter) for line in lines}
         if cuts != {len(self.headings) - 1}:
             return None
@@ -116,7 +122,13 @@ class CsvTable:
             return None
         if len(samples) != len(lines):
             return None
-        return samples, [[line.split(self._delimiter, index + 1)[index] for line in lines] for index in texts]
+        return samples, [self._cells(lines, index) for index in texts]
+
+    def _cells(self, lines: list[str], index: int) -> list[str]:
+        """One column of text; equal cells, as in the names of impacts, are one string."""
+        known: dict[str, str] = {}
+        cells = (line.split(self._delimiter, index + 1)[index].rstrip("\r\n") for line in lines)
+        return [known.setdefault(cell, cell) for cell in cells]
 
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
         """A block cell by cell, saying what is wrong with it."""
@@ -213,6 +225,11 @@ def _delimiter(heading: str) -> str:
     if counts[0][0] == counts[1][0]:
         raise _unreadable("The headings hold two separators equally often: use one for the whole file.")
     return counts[0][1]
+
+
+def _simply_quoted(delimiter: str) -> re.Pattern[str]:
+    """A cell in quotes that hold neither separators nor quotes: it is what stands between them."""
+    return re.compile(rf'(?:^|(?<={delimiter}))"([^"{delimiter}\r\n]*)"(?=[{delimiter}\r\n]|$)')
 
 
 def _unreadable(detail: str) -> Problem:

@@ -10,6 +10,7 @@ from ingest_files import GENERIC, codes, csv_text, one, outcome, read, refused, 
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest import csv_format
+from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 
 
@@ -104,6 +105,32 @@ def test_a_bad_cell_is_the_fault_of_its_own_impact(cell: str):
     assert "column 4" in bad.detail
     assert "sample 4" in bad.detail
     assert "row 41" in bad.detail
+
+
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_the_last_line_needs_no_end_though_it_names_its_impact(quote: str):
+    lines = csv_text().splitlines()
+    text = "\n".join([f"{lines[0]},external_id", *(f"{line},{quote}a{quote}" for line in lines[1:])])
+    assert [record.external_id for record in read(text) if isinstance(record, ImpactRecord)] == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("cell", "held"),
+    [('"a"', "a"), ('"a,b"', "a,b"), ('"a""b"', 'a"b'), ('""', None), ('"a\nb"', None)],
+)
+def test_quotes_in_some_rows_change_nothing_in_the_others(cell: str, held: str | None, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(csv_format, "ROWS_AT_ONCE", 7)
+    lines = csv_text().splitlines()
+    rows = [f"{cell if number == 20 else 'plain'},{line}" for number, line in enumerate(lines[1:])]
+    mapped = {"group_by": "label", "external_id": "label", "time": {"column": "t_s", "unit": "s"}}
+    columns = {"linear_acceleration": {"unit": "g", "x": "ax_g", "y": "ay_g", "z": "az_g"}}
+    found = read("\n".join([f"label,{lines[0]}", *rows]), mapping=Mapping.model_validate(mapped | columns))
+    assert len(found) == 2
+    first = found[0]
+    assert isinstance(first, ImpactRecord)
+    assert first.recording.linear_acceleration is not None
+    assert first.recording.linear_acceleration.values.shape == (39, 3)
+    assert (found[1].external_id if hasattr(found[1], "external_id") else None) == held
 
 
 def test_decimal_commas_are_refused_as_what_they_are():
