@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from headimpact.criteria import BY_KEY
 from headimpact_service.ingest.record import ImpactRecord
 
 RESEARCH_USE = "Research use only: the model rests on adult men, and this is no diagnosis."
@@ -49,19 +48,24 @@ def _peaks(document: Mapping[str, Any]) -> Text:
 
 
 def _criteria(document: Mapping[str, Any]) -> Table:
-    table = Table("Criterion", "Value", "x", "y", "z", "Unit", "Probability")
-    for column in table.columns[1:5]:
-        column.justify = "right"
-    table.columns[6].justify = "right"
+    """Keys rather than names, and no frame: every row stays on one line of 80 columns."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    for heading, side in (
+        ("criterion", "left"),
+        ("value, or x y z", "right"),
+        ("unit", "left"),
+        ("probability", "right"),
+    ):
+        table.add_column(heading, justify=side, no_wrap=True)  # type: ignore[arg-type] # left or right
     for key, found in document["criteria"].items():
-        table.add_row(BY_KEY[key].name, *_values(found["value"]), found["unit"], _number(found["probability"]))
+        table.add_row(key, _values(found["value"]), found["unit"], _number(found["probability"]))
     return table
 
 
-def _values(value: Any) -> tuple[str, str, str, str]:  # noqa: ANN401 - a number, a vector or nothing
+def _values(value: Any) -> str:  # noqa: ANN401 - a number, a vector or nothing
     if isinstance(value, dict):
-        return ("", *(_number(value[axis]) for axis in ("x", "y", "z")))  # type: ignore[return-value] # three axes
-    return _number(value), "", "", ""
+        return " ".join(_number(value[axis]) for axis in ("x", "y", "z"))
+    return _number(value)
 
 
 def _point(point: Mapping[str, Any]) -> str:

@@ -243,7 +243,9 @@ def correct(
     """
     present = _require(conn, data_set_id, impact_id)
     kept = revisions(conn, data_set_id, impact_id)
-    if kept[-1].content_digest == new.content_digest:
+    same_name = new.external_id is None or new.external_id == present.external_id
+    sent_again = if_match is None or present.revision - if_match in {0, 1}
+    if kept[-1].content_digest == new.content_digest and same_name and sent_again:
         return Outcome("unchanged", present)
     require_revision(present.revision, if_match)
     known = _look_up(conn, data_set_id, new)

@@ -12,6 +12,7 @@ import pytest
 from conforming import document
 from sending import Api, impact_body, score_body
 
+from headimpact.criteria import CRITERION_KEYS
 from headimpact_service import __main__ as command_line
 from headimpact_service.deps import SCOPES
 from headimpact_service.pages.problems import as_markdown
@@ -94,12 +95,17 @@ class TestScore:
         assert code == 0
         assert json.loads(printed) == api.post("/v1/score", json=score_body()).json()
 
-    def test_the_table_shows_every_criterion_and_what_was_noted(self, run: Run, tmp_path: Path) -> None:
+    def test_the_table_shows_every_criterion_on_one_line_of_80_columns(
+        self, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("COLUMNS", "80")
         file = tmp_path / "impact.json"
         file.write_text(json.dumps(impact_body("e-1", scale=0.05)))
         code, printed, _ = run("score", str(file))
         assert code == 0
-        for words in ("Brain angle metric", "Head injury criterion, 15 ms", "Research use only", "bam at sensitivity"):
+        assert {line.split()[0] for line in printed.splitlines() if line}.issuperset(CRITERION_KEYS)
+        assert "…" not in printed
+        for words in ("Research use only", "bam at sensitivity"):
             assert words in printed
 
     def test_several_impacts_are_a_list_and_a_bad_one_is_said_on_standard_error(self, run: Run, tmp_path: Path) -> None:

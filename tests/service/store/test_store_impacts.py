@@ -175,6 +175,15 @@ class TestCorrect:
         with database.read() as conn:
             assert athletes.find(conn, data_set, "never-seen") is None
 
+    def test_equal_content_does_not_hide_another_name_or_revision(self, database, data_set, make_impact) -> None:
+        first = add(database, data_set, make_impact()).impact
+        with pytest.raises(Problem) as caught:
+            self.correct(database, data_set, first.id, make_impact(external_id="event-2"), 1)
+        assert caught.value.slug == "conflict"
+        with pytest.raises(Problem) as caught:
+            self.correct(database, data_set, first.id, make_impact(), 7)
+        assert caught.value.slug == "precondition-failed"
+
     def test_what_is_not_there_cannot_be_corrected(self, database, data_set, make_impact) -> None:
         with pytest.raises(Problem) as caught:
             self.correct(database, data_set, ids.new(), make_impact())
