@@ -32,6 +32,7 @@ def upgrade() -> None:
         sa.Column("done", sa.Integer(), nullable=False),
         sa.Column("total", sa.Integer()),
         sa.Column("result", sa.JSON()),
+        sa.Column("details", sa.JSON()),
         sa.Column("problem", sa.JSON()),
         sa.Column("created_at", sa.BigInteger(), nullable=False),
         sa.Column("updated_at", sa.BigInteger(), nullable=False),

@@ -17,7 +17,7 @@ from headimpact_service.deps import uploads_of
 from headimpact_service.jobs import runs
 from headimpact_service.jobs.import_file import ImportFile
 from headimpact_service.jobs.runs import House, Kind
-from headimpact_service.jobs.slots import Slot
+from headimpact_service.jobs.slots import Slot, SlotsTakenError
 from headimpact_service.settings import Settings
 from headimpact_service.store import ids, job_runs
 from headimpact_service.store.database import Database
@@ -50,7 +50,6 @@ class Engine:
         self._retention = timedelta(days=retention_days)
         self._at_once = at_once
         self._woken = threading.Event()
-        self._running = threading.Semaphore(0)
         self._active = 0
         self._lock = threading.Lock()
         self._transact: Transact | None = None
@@ -74,18 +73,26 @@ class Engine:
             self._thread.join()
 
     def _work(self) -> None:
-        with Slot(self._folder) as slot:
-            self._clean_uploads(slot)
-            while not self._house.stopping.is_set():
-                self._woken.clear()
-                try:
-                    self._tick(slot)
-                except Exception:
-                    logger.exception("The job engine could not do its round; it tries again.")
-                self._woken.wait(TICK_S)
-            self._close()
+        try:
+            with Slot(self._folder) as slot:
+                while not self._house.stopping.is_set():
+                    self._woken.clear()
+                    self._round(slot)
+                    self._woken.wait(TICK_S)
+                self._close()
+        except (OSError, SlotsTakenError):
+            logger.exception("No jobs run in this process: its folder beside the database cannot be used.")
+
+    def _round(self, slot: Slot) -> None:
+        try:
+            self._tick(slot)
+        except Exception:
+            logger.exception("The job engine could not do its round; it tries again.")
 
     def _tick(self, slot: Slot) -> None:
+        if datetime.now(UTC) >= self._next_night:
+            self._clean_up(slot)
+            self._next_night = next_night(datetime.now(UTC))
         with self._house.database.read() as conn:
             unfinished = job_runs.unfinished(conn)
         if unfinished and self._transact is None:
@@ -93,9 +100,6 @@ class Engine:
         if self._transact is not None:
             self._bring(self._transact, unfinished)
             self._take_over(self._transact, slot)
-        if datetime.now(UTC) >= self._next_night:
-            self._clean_up(slot)
-            self._next_night = next_night(datetime.now(UTC))
 
     def _launch(self, slot: Slot) -> Transact:
         from headimpact_service.jobs.transact import Transact  # costs seconds: not before there is a job

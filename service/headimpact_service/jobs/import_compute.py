@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.upload import read_upload
 from headimpact_service.intake.importing import Ready, look_up, make_ready, score_found
@@ -33,6 +34,8 @@ def compute(arguments: dict[str, Any]) -> Iterator[int | Chunk]:
     """
     path, size = Path(arguments["path"]), arguments["chunk"]
     options = ImportOptions.from_fields(arguments["fields"], **arguments["known"])
+    if not path.exists():
+        raise Problem("unreadable-file", "The file that was uploaded is no longer there.")
     if arguments["total"] is None:
         yield sum(1 for _ in read_upload(path, options))
     database = Database(arguments["database_url"], readers=1)

@@ -8,7 +8,7 @@ from typing import Any
 
 from headimpact_service.intake.importing import COUNTED, store, summary
 from headimpact_service.jobs.import_compute import Chunk
-from headimpact_service.jobs.runs import House, Outcome, Work
+from headimpact_service.jobs.runs import House, Outcome, Result, Work
 from headimpact_service.store import ids
 from headimpact_service.store.jobs import Job
 
@@ -26,15 +26,16 @@ class ImportFile:
         with work.computing("headimpact_service.jobs.import_compute:compute", self._arguments(work)) as values:
             for value in values:
                 if isinstance(value, Chunk):
-                    work.commit(value.number, len(value.ready), partial(_store, work.job.data_set_id, value))
+                    room = SHOWN - sum(len(outcome["failed"]) for outcome in work.outcomes)
+                    work.commit(value.number, len(value.ready), partial(_store, work.job.data_set_id, value, room))
                 else:
                     work.expect(value)
 
-    def result(self, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    def result(self, outcomes: Sequence[Outcome]) -> Result:
         """How many were created, unchanged and failed, and the first of those that failed."""
         counts = {name: sum(outcome["summary"][name] for outcome in outcomes) for name in COUNTED}
-        failed = [row for outcome in outcomes for row in outcome["failed"]][:SHOWN]
-        return {"summary": counts, "failed": failed, "failed_not_shown": counts["failed"] - len(failed)}
+        failed = [row for outcome in outcomes for row in outcome["failed"]]
+        return Result({"summary": counts, "failed_not_shown": counts["failed"] - len(failed)}, {"failed": failed})
 
     def clean(self, job: Job, house: House) -> None:
         """Delete the upload."""
@@ -50,11 +51,12 @@ class ImportFile:
             "data_set_id": job.data_set_id,
             "key_id": job.key_id,
             "total": job.total,
-            "first": work.chunks,
+            "first": len(work.outcomes),
         }
 
 
-def _store(data_set_id: bytes, chunk: Chunk, conn: Any) -> Outcome:  # noqa: ANN401 - a connection of the store
+def _store(data_set_id: bytes, chunk: Chunk, room: int, conn: Any) -> Outcome:  # noqa: ANN401 - a connection of the store
+    """`room` is how many refused impacts may still be kept to be shown."""
     rows = store(conn, data_set_id, chunk.ready, chunk.first)
     failed = [row for row in rows if row["status"] == "failed"]
-    return {"summary": summary(rows), "failed": failed[:SHOWN]}
+    return {"summary": summary(rows), "failed": failed[: max(0, room)]}

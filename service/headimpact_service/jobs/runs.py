@@ -28,6 +28,14 @@ LOOK_S = 1.0
 Outcome = Mapping[str, Any]
 
 
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What a job came to: what lists show of it, and what may be long."""
+
+    short: Mapping[str, Any]
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
 class Kind(Protocol):
     """A kind of job."""
 
@@ -36,7 +44,7 @@ class Kind(Protocol):
     def run(self, work: Work) -> None:
         """Do the job, from the first part that is not committed yet."""
 
-    def result(self, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    def result(self, outcomes: Sequence[Outcome]) -> Result:
         """What the committed parts come to, all of them or those until the job stopped."""
 
     def clean(self, job: Job, house: House) -> None:
@@ -78,8 +86,8 @@ class Work:
         self.house = house
         self.job = job
         with house.database.read() as conn:
-            self.chunks: int = job_runs.chunks(conn, job.id)
-            """How many parts are committed: the number of the first that is not."""
+            self.outcomes = job_runs.outcomes(conn, job.id)
+            """What the parts that are committed came to; their number is that of the first that is not."""
         self._looked = -LOOK_S
 
     def expect(self, total: int) -> None:
@@ -93,12 +101,18 @@ class Work:
         connection, does nothing but read and write the database, and may run more than once.
         """
         self.check()
-        job = self.job
-        committed = self.house.database.write(lambda conn: job_runs.commit(conn, job.id, job.run, chunk, done, write))
+        job, outcomes = self.job, []
+
+        def once(conn: Any) -> Outcome:  # noqa: ANN401 - a connection of the store
+            outcomes.append(write(conn))
+            return outcomes[-1]
+
+        committed = self.house.database.write(lambda conn: job_runs.commit(conn, job.id, job.run, chunk, done, once))
         if committed == "cancelling":
             raise CancelledError
         if committed == "superseded":
             raise SupersededError
+        self.outcomes.extend(outcomes[-1:])
 
     def computing(self, task: str, arguments: Mapping[str, Any]) -> AbstractContextManager[Iterator[Any]]:
         """What `task` yields in a child process."""
@@ -172,10 +186,11 @@ def _end(house: House, kind: Kind, job: Job, state: State, ending: Ending) -> No
     def finish(conn: Any) -> bool:  # noqa: ANN401 - a connection of the store
         outcomes = job_runs.outcomes(conn, job.id)
         result = kind.result(outcomes) if outcomes or state != "failed" else None
+        short, details = (None, None) if result is None else (result.short, result.details)
         now = job_runs.get(conn, job.id)
         problem = ending(now or job) if callable(ending) else ending
         document = None if problem is None else problem.as_dict()
-        return job_runs.finish(conn, job.id, job.run, state, result=result, problem=document)
+        return job_runs.finish(conn, job.id, job.run, state, result=short, details=details, problem=document)
 
     if house.database.write(finish):
         kind.clean(job, house)

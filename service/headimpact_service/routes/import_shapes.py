@@ -60,4 +60,4 @@ class ImportResult(BaseModel):
     failed: list[ImportedView] | None = Field(
         None, description="The first 1000 refused impacts, in the file's order; not in lists."
     )
-    failed_not_shown: int | None = Field(None, description="Refused impacts behind those; not in lists.")
+    failed_not_shown: int = Field(description="Refused impacts behind those.")

@@ -80,7 +80,7 @@ def job_document(job: Job) -> dict[str, Any]:
         "kind": job.kind,
         "state": job.state,
         "progress": {"done": job.done, "total": job.total},
-        "result": job.result,
+        "result": None if job.result is None else {**job.result, **(job.details or {})},
         "problem": job.problem,
         "created_at": job.created_at,
         "updated_at": job.updated_at,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from pydantic import Field
 from starlette.responses import Response
@@ -51,7 +50,7 @@ async def list_jobs(call: Call) -> Response:
         lambda conn, after, limit: jobs.page(
             conn, call.data_set_id, kinds=kinds, state=query.state, limit=limit, after=after
         ),
-        _row,
+        job_document,
         ("id", "kind", "state", "done", "total", "created_at", "updated_at", "started_at", "finished_at"),
         _cells,
     )
@@ -103,12 +102,6 @@ async def _visible(call: Call) -> Job:
         scopes = " or ".join(sorted(SEEN_WITH[job.kind]))
         raise Problem("insufficient-scope", f"This operation needs a key with the scope {scopes}.")
     return job
-
-
-def _row(job: Job) -> dict[str, Any]:
-    """A job in a list: its result without what may be long."""
-    result = job.result
-    return job_document(job) | {"result": None if result is None else {"summary": result["summary"]}}
 
 
 def _cells(job: Job) -> list[Cell]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from sqlalchemy import Connection, bindparam, delete, func, insert, select, update
+from sqlalchemy import Connection, bindparam, delete, insert, select, update
 
 from headimpact_service.store.jobs import Job, State
 from headimpact_service.store.tables import job_chunks, jobs
@@ -20,7 +20,6 @@ _JOB = select(jobs).where(jobs.c.id == bindparam("job_id"))
 _UNFINISHED = select(jobs).where(jobs.c.finished_at.is_(None)).order_by(jobs.c.id)
 _UPDATE = update(jobs).where(jobs.c.id == bindparam("job"))
 _CHUNKS = select(job_chunks.c.outcome).where(job_chunks.c.job_id == bindparam("job_id")).order_by(job_chunks.c.number)
-_COUNT = select(func.count()).where(job_chunks.c.job_id == bindparam("job_id"))
 _CHUNK = select(job_chunks.c.number).where(
     job_chunks.c.job_id == bindparam("job_id"), job_chunks.c.number == bindparam("chunk")
 )
@@ -80,11 +79,6 @@ def commit(
     return "stored"
 
 
-def chunks(conn: Connection, job_id: bytes) -> int:
-    """How many parts are committed; they are committed in order."""
-    return conn.execute(_COUNT, {"job_id": job_id}).scalar_one()
-
-
 def outcomes(conn: Connection, job_id: bytes) -> list[Mapping[str, Any]]:
     """What each committed part came to, in order."""
     return list(conn.execute(_CHUNKS, {"job_id": job_id}).scalars())
@@ -97,13 +91,16 @@ def finish(
     state: State,
     *,
     result: Mapping[str, Any] | None,
+    details: Mapping[str, Any] | None = None,
     problem: Mapping[str, Any] | None = None,
 ) -> bool:
-    """End the job, and forget its parts; False if it had ended, or went on in another run."""
+    """End the job, and forget its parts and arguments; False if it had ended, or went on in another run."""
     if _of_run(conn, job_id, run) is None:
         return False
     now = datetime.now(UTC)
-    _change(conn, job_id, now, {"state": state, "result": result, "problem": problem, "finished_at": now})
+    ending = {"state": state, "result": result, "details": details, "problem": problem}
+    # What was sent beside a file may name people; who looks at the job later needs none of it.
+    _change(conn, job_id, now, {**ending, "arguments": {}, "finished_at": now})
     conn.execute(_FORGET, {"job": job_id})
     return True
 

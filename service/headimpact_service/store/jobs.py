@@ -35,7 +35,11 @@ class NewJob:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A job as stored. `done` of `total` parts are committed; `total` is None until it is known."""
+    """A job as stored. `done` of `total` are committed; `total` is None until it is known.
+
+    `result` is short, `details` may be long: what is read for a list leaves them out, and the arguments. A job that
+    has ended has no arguments any more.
+    """
 
     id: bytes
     data_set_id: bytes
@@ -43,7 +47,7 @@ class Job:
     kind: str
     idempotency_key: str | None
     request_hash: bytes | None
-    arguments: Mapping[str, Any]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
     state: State
     run: int
     crashes: int
@@ -51,6 +55,7 @@ class Job:
     done: int
     total: int | None
     result: Mapping[str, Any] | None
+    details: Mapping[str, Any] | None = None
     problem: Mapping[str, Any] | None
     created_at: datetime
     updated_at: datetime
@@ -65,6 +70,9 @@ class Job:
 
 _JOB = select(jobs)
 _OF_DATA_SET = _JOB.where(jobs.c.data_set_id == bindparam("data_set_id"))
+_LIST = select(*(column for column in jobs.c if column.name not in {"arguments", "details"})).where(
+    jobs.c.data_set_id == bindparam("data_set_id")
+)
 _ONE = _OF_DATA_SET.where(jobs.c.id == bindparam("job_id"))
 _BY_KEY = _OF_DATA_SET.where(jobs.c.idempotency_key == bindparam("idempotency_key"))
 _CANCEL = update(jobs).where(jobs.c.id == bindparam("job"))
@@ -138,7 +146,7 @@ def page(
     after: Position | None = None,
 ) -> Page[Job]:
     """A page of the jobs of these kinds, newest first."""
-    query = _OF_DATA_SET.where(jobs.c.kind.in_(sorted(kinds)))
+    query = _LIST.where(jobs.c.kind.in_(sorted(kinds)))
     if state is not None:
         query = query.where(jobs.c.state == state)
     query = keyset(query, jobs, updated_since=None, after=after, limit=limit)
@@ -160,6 +168,6 @@ def cancel(conn: Connection, data_set_id: bytes, job_id: bytes) -> Job:
     values: dict[str, Any] = {"state": "cancelling", "not_before": None, "updated_at": now}
     if found.started_at is None:
         problem = Problem("job-cancelled", "Cancelled before it began; nothing was changed.")
-        values |= {"state": "cancelled", "finished_at": now, "problem": problem.as_dict()}
+        values |= {"state": "cancelled", "finished_at": now, "problem": problem.as_dict(), "arguments": {}}
     conn.execute(_CANCEL, {"job": job_id, **values})
     return require(conn, data_set_id, job_id)

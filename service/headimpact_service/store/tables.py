@@ -233,6 +233,8 @@ jobs = Table(
     Column("done", Integer, nullable=False),
     Column("total", Integer),
     Column("result", Document),
+    # The part of the result that may be long: lists do not read it.
+    Column("details", Document),
     Column("problem", Document),
     Column("created_at", Instant, nullable=False),
     Column("updated_at", Instant, nullable=False),

@@ -67,6 +67,7 @@ class Incoming:
         self._file: BinaryIO = BytesIO()
         self._path: Path | None = None
         self.length = 0
+        self._hashed: bytes | None = None
 
     def __enter__(self) -> Incoming:
         """Itself."""
@@ -84,6 +85,7 @@ class Incoming:
     def write(self, data: bytes) -> int:
         """Append bytes."""
         self.length += len(data)
+        self._hashed = None
         if self.is_large and self._path is None:
             self._move_to_folder()
         return self._file.write(data)
@@ -102,12 +104,14 @@ class Incoming:
         return self._file.read()
 
     def digest(self) -> bytes:
-        """SHA-256 of all of it."""
-        self._file.seek(0)
-        hashed = sha256()
-        while block := self._file.read(BLOCK):
-            hashed.update(block)
-        return hashed.digest()
+        """SHA-256 of all of it, read once."""
+        if self._hashed is None:
+            self._file.seek(0)
+            hashed = sha256()
+            while block := self._file.read(BLOCK):
+                hashed.update(block)
+            self._hashed = hashed.digest()
+        return self._hashed
 
     def keep(self, name: str) -> None:
         """Bring it to disk under a name: when this returns, it survives the power."""

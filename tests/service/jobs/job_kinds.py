@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from headimpact_service.errors import Problem
-from headimpact_service.jobs.runs import House, Outcome, Work
+from headimpact_service.jobs.runs import House, Outcome, Result, Work
 from headimpact_service.store import job_runs
 from headimpact_service.store.jobs import Job
 
@@ -26,7 +26,7 @@ class Counting:
 
     def run(self, work: Work) -> None:
         work.expect(self.parts * 10)
-        for number in range(work.chunks, self.parts):
+        for number in range(len(work.outcomes), self.parts):
             self.before(number, work)
             work.commit(number, 10, lambda _, number=number: self._write(number))
 
@@ -34,8 +34,8 @@ class Counting:
         self.written.append(number)
         return {"n": 10}
 
-    def result(self, outcomes: Sequence[Outcome]) -> dict[str, Any]:
-        return {"n": sum(outcome["n"] for outcome in outcomes)}
+    def result(self, outcomes: Sequence[Outcome]) -> Result:
+        return Result({"n": sum(outcome["n"] for outcome in outcomes)}, {"parts": [dict(o) for o in outcomes]})
 
     def clean(self, job: Job, house: House) -> None:
         self.cleaned.append(job.id)
