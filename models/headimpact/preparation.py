@@ -34,6 +34,7 @@ from headimpact.quality import (
     check_rate,
     words,
 )
+from headimpact.record_rules import rate_of, require_derived_within, require_motion, require_within
 from headimpact.recording import Mounting, Recording, Signal, SignalName
 
 TO_CRITERIA_UNIT: dict[str, float] = {
@@ -43,11 +44,6 @@ TO_CRITERIA_UNIT: dict[str, float] = {
     "deg/s": radians(1.0),
     "rad/s^2": 1.0,
     "deg/s^2": radians(1.0),
-}
-UNITS_OF: dict[str, tuple[str, str]] = {
-    "linear_acceleration": ("g", "m/s^2"),
-    "angular_velocity": ("rad/s", "deg/s"),
-    "angular_acceleration": ("rad/s^2", "deg/s^2"),
 }
 # Components that a plane of motion leaves: (linear axes, rotation axes).
 PLANES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
@@ -93,7 +89,7 @@ def prepare(recording: Recording) -> Preparation:
     signals = recording.signals()
     if not signals:
         raise TraceError("no-signal", "A recording needs linear acceleration, angular velocity or both.")
-    _require_motion(signals)
+    require_motion(signals)
     clock_start_s = min((float(s.time_s[0]) for _, s in signals if s.time_s is not None), default=0.0)
     sent = {name: _uniform(name, signal, clock_start_s, notes) for name, signal in signals}
     notes += _notes_as_sent(recording, sent)
@@ -106,7 +102,7 @@ def prepare(recording: Recording) -> Preparation:
         in_head = {name: _constrain(name, s, recording.constrained_plane, notes) for name, s in in_head.items()}
     rate, start_s, aligned = _one_time_base(in_head)
     if sources[1] == "five_point_stencil":
-        _require_derived_within(aligned["angular_acceleration"])
+        require_derived_within(aligned["angular_acceleration"])
     aligned = _at_head_cg(aligned, recording)
     start_ms = (start_s - clock_start_s) * 1000.0 - (recording.pre_trigger_ms or 0.0)
     kinematics = HeadKinematics(
@@ -130,48 +126,6 @@ def _without_gaps(recording: Recording, notes: list[QualityNote]) -> Recording:
     return replace(recording, **filled)  # type: ignore[arg-type] # the keys are its fields
 
 
-def _require_motion(signals: list[tuple[SignalName, Signal]]) -> None:
-    """Refuse lengths and values that no criterion can use, and a record in which nothing moves."""
-    limits = QUALITY_LIMITS["record"]
-    for name, signal in signals:
-        n = signal.values.shape[0]
-        if signal.values.ndim != 2 or signal.values.shape[1] != 3:
-            raise TraceError("wrong-shape", f"The {words(name)} must have three components.", signal=name)
-        if not limits["minimum_samples"] <= n <= limits["maximum_samples"]:
-            raise TraceError(
-                "sample-count",
-                f"The {words(name)} must have {limits['minimum_samples']} to {limits['maximum_samples']} samples.",
-                signal=name,
-            )
-        if signal.unit not in UNITS_OF[name]:
-            raise TraceError(
-                "unknown-unit", f"The {words(name)} must be in {' or '.join(UNITS_OF[name])}.", signal=name
-            )
-        _require_time_base(name, signal)
-        finite = np.isfinite(signal.values)
-        if not finite.all():
-            index, axis = np.argwhere(~finite)[0]
-            raise TraceError(
-                "missing-sample",
-                f"The {words(name)} holds a value that is no number.",
-                signal=name,
-                channel=AXES[axis],
-                index=int(index),
-            )
-    if all((signal.values == signal.values[0]).all() for _, signal in signals):
-        raise TraceError("constant-signal", "Every channel of every signal is constant: nothing moved.")
-
-
-def _require_time_base(name: SignalName, signal: Signal) -> None:
-    """Refuse a signal whose times are not known, or known twice."""
-    if (signal.sample_rate_hz is None) == (signal.time_s is None):
-        raise TraceError(
-            "time-base", f"The {words(name)} must have either a sample rate or time stamps, and not both.", signal=name
-        )
-    if signal.time_s is not None and signal.time_s.shape != signal.values.shape[:1]:
-        raise TraceError("stamp-count", f"The {words(name)} must have one time stamp per sample.", signal=name)
-
-
 def _uniform(name: SignalName, signal: Signal, clock_start_s: float, notes: list[QualityNote]) -> _Uniform:
     """A signal in the criteria's unit on uniform samples."""
     factor = TO_CRITERIA_UNIT[signal.unit]
@@ -179,12 +133,12 @@ def _uniform(name: SignalName, signal: Signal, clock_start_s: float, notes: list
     values = np.asfortranarray(signal.values, dtype=np.float64)
     if factor != 1.0:
         values = values * factor
-    _require_within(name, values)
+    require_within(name, values)
     if signal.time_s is None:
         assert signal.sample_rate_hz is not None
         rate, start_s = float(signal.sample_rate_hz), clock_start_s
     else:
-        rate, start_s = _rate_of(name, signal.time_s), float(signal.time_s[0])
+        rate, start_s = rate_of(name, signal.time_s), float(signal.time_s[0])
         values = _resampled(name, values, signal.time_s, rate, notes)
     limits = QUALITY_LIMITS["record"]
     if not limits["minimum_rate_hz"] <= rate <= limits["maximum_rate_hz"]:
@@ -195,30 +149,6 @@ def _uniform(name: SignalName, signal: Signal, clock_start_s: float, notes: list
         )
     notes += check_rate(name, rate)
     return _Uniform(values, rate, start_s)
-
-
-def _rate_of(name: SignalName, time_s: FloatArray) -> float:
-    """Samples per second of stamps that increase, each step within 15 % of the median one [Hz]."""
-    steps = np.diff(time_s)
-    stuck = np.flatnonzero(~(steps > 0))
-    if stuck.size:
-        raise TraceError(
-            "time-not-increasing",
-            f"The time stamps of the {words(name)} must increase from sample to sample.",
-            signal=name,
-            index=int(stuck[0]) + 1,
-        )
-    bound = QUALITY_LIMITS["record"]["maximum_jitter"]
-    median = float(np.median(steps))
-    far = np.flatnonzero(np.abs(steps - median) > bound * median)
-    if far.size:
-        raise TraceError(
-            "time-jitter",
-            f"The steps between time stamps of the {words(name)} must stay within {bound:.0%} of their median.",
-            signal=name,
-            index=int(far[0]) + 1,
-        )
-    return float((time_s.size - 1) / (time_s[-1] - time_s[0]))
 
 
 def _resampled(
@@ -240,35 +170,6 @@ def _resampled(
     )
     even = np.linspace(time_s[0], time_s[-1], time_s.size)
     return np.stack([np.interp(even, time_s, values[:, axis]) for axis in range(3)], axis=1)
-
-
-def _require_within(name: SignalName, values: FloatArray) -> None:
-    """Refuse samples that no head survives to send: they are another unit or a broken channel."""
-    bound = QUALITY_LIMITS[name]["refused"]
-    if values.max() <= bound and values.min() >= -bound:
-        return
-    index, axis = np.argwhere(np.abs(values) > bound)[0]
-    raise TraceError(
-        "value-out-of-range",
-        f"The {words(name)} must stay within {bound:g} {UNITS_OF[name][0]}; check the unit it was sent in.",
-        signal=name,
-        channel=AXES[axis],
-        index=int(index),
-    )
-
-
-def _require_derived_within(alpha: FloatArray) -> None:
-    """The same bound for angular acceleration that was derived, and so not checked as sent.
-
-    The velocity is to blame, but no one sample of it.
-    """
-    bound = QUALITY_LIMITS["angular_acceleration"]["refused"]
-    if alpha.max() > bound or alpha.min() < -bound:
-        raise TraceError(
-            "value-out-of-range",
-            f"The derivative of the angular velocity must stay within {bound:g} rad/s^2; check its unit and its rate.",
-            signal="angular_velocity",
-        )
 
 
 def _notes_as_sent(recording: Recording, sent: dict[SignalName, _Uniform]) -> Iterator[QualityNote]:

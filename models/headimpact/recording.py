@@ -67,7 +67,8 @@ class Mounting:
     Raises
     ------
     TraceError
-        ``improper-rotation``, where a matrix is not orthonormal with determinant +1 within 1e-3.
+        ``improper-rotation``, where a matrix is not orthonormal with determinant +1 within 1e-3;
+        ``improper-offset``, where the offset is no number.
     """
 
     accelerometer_rotation: FloatArray
@@ -82,6 +83,8 @@ class Mounting:
             ("gyroscope", self.gyroscope_rotation),
         ):
             require_proper_rotation(rotation, sensor)
+        if not np.isfinite(self.offset_m).all():
+            raise TraceError("improper-offset", "The accelerometer's offset must be three finite lengths.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -234,3 +234,9 @@ def test_a_rotation_printed_to_four_digits_is_accepted():
 def test_an_offset_of_zero_needs_no_rotation():
     mounting = Mounting(np.eye(3), np.eye(3), np.zeros(3))
     assert prepare(replace(recording(angular_velocity=None), mounting=mounting)).kinematics.samples == 100
+
+
+def test_an_offset_that_is_no_length_is_refused():
+    with pytest.raises(TraceError) as raised:
+        Mounting(np.eye(3), np.eye(3), np.array([0.0, np.nan, 0.0]))
+    assert raised.value.code == "improper-offset"
