@@ -15,6 +15,8 @@ MAX_SAMPLES = 20_000
 MIN_RATE_HZ = 500.0
 MAX_RATE_HZ = 1_000_000.0
 MAX_OPERATING_POINTS = 20
+MIN_CUT_OFF_HZ = 1.0
+"""A lower one leaves nothing of an impact, and far below it the filter's equations are singular."""
 
 # No control characters: they have no place in a name, and PostgreSQL stores no NUL.
 PRINTABLE = r"^[^\u0000-\u001f\u007f]+$"
@@ -187,7 +189,7 @@ def _json_kind(value: Any) -> str | None:  # noqa: ANN401 - whatever the JSON he
 
 
 CutOff = Annotated[
-    Annotated[Annotated[float, Field(gt=0.0, le=MAX_RATE_HZ)], Tag("hertz")]
+    Annotated[Annotated[float, Field(ge=MIN_CUT_OFF_HZ, le=MAX_RATE_HZ)], Tag("hertz")]
     | Annotated[Literal["CFC60", "CFC180", "CFC600", "CFC1000"], Tag("name")],
     Discriminator(
         _json_kind,

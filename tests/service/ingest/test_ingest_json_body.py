@@ -318,6 +318,8 @@ def test_filters_by_name_in_hertz_and_by_class():
         (None, ("/kinematics/filter", "wrong-type")),
         ({"linear_acceleration": "CFC18"}, ("/kinematics/filter/linear_acceleration", "not-allowed")),
         ({"linear_acceleration": 0}, ("/kinematics/filter/linear_acceleration", "out-of-range")),
+        ({"linear_acceleration": 5e-324}, ("/kinematics/filter/linear_acceleration", "out-of-range")),
+        ({"angular_velocity": 0.9}, ("/kinematics/filter/angular_velocity", "out-of-range")),
         ({"linear_acceleration": False}, ("/kinematics/filter/linear_acceleration", "wrong-type")),
         ({"angular_acceleration": 100}, ("/kinematics/filter/angular_acceleration", "unknown-field")),
     ],
