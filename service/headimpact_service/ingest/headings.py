@@ -50,6 +50,11 @@ class Headings:
                     return places[0]
         return None
 
+    def nearest(self, spelling: str, column: int) -> int | None:
+        """Of the columns that a spelling names, the nearest before `column`, else the first."""
+        places = self._exact.get(spelling.strip()) or self._compact.get(compact(spelling)) or []
+        return max((place for place in places if place < column), default=min(places, default=None))
+
 
 def _places(names: Sequence[str]) -> dict[str, list[int]]:
     places: dict[str, list[int]] = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
@@ -21,11 +22,28 @@ class Component:
 
 
 @dataclass(frozen=True, slots=True)
+class Clock:
+    """A column of stamps; `milliseconds` are those of one unit of them."""
+
+    column: int
+    milliseconds: float
+
+
+@dataclass(frozen=True, slots=True)
 class SignalLayout:
-    """One signal's columns."""
+    """One signal's columns; `clock` where it has its own."""
 
     unit: str
     components: tuple[Component, Component, Component]
+    clock: Clock | None = None
+    resultant: int | None = None
+    sample_rate_hz: float | None = None
+    full_scale: float | None = None
+
+    @property
+    def columns(self) -> list[int]:
+        """The columns of its components."""
+        return [component.column for component in self.components if component.column is not None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,25 +51,30 @@ class Layout:
     """Every column that is read, by its index."""
 
     signals: dict[SignalName, SignalLayout]
-    time: int | None
-    time_factor: float
+    clock: Clock | None
     keys: tuple[int, ...]
     external_id: int | None
     athlete: int | None
     device: int | None
-    session_id: int | None
     occurred_at: tuple[int, ...]
+    context: dict[str, int]
+    reading: dict[str, int]
+    unscorable: int | None
+    time_base: int | None
 
     @property
     def numbers(self) -> list[int]:
         """Columns that are read as numbers."""
-        components = [c.column for signal in self.signals.values() for c in signal.components]
-        return sorted({column for column in (*components, self.time) if column is not None})
+        signals = self.signals.values()
+        clocks = [clock.column for clock in (self.clock, *(signal.clock for signal in signals)) if clock is not None]
+        resultants = [signal.resultant for signal in signals if signal.resultant is not None]
+        return sorted({*clocks, *resultants, *(column for signal in signals for column in signal.columns)})
 
     @property
     def texts(self) -> list[int]:
         """Columns that are read as text."""
-        named = (self.external_id, self.athlete, self.device, self.session_id, *self.keys, *self.occurred_at)
+        one_each = (self.external_id, self.athlete, self.device, self.unscorable, self.time_base)
+        named = (*one_each, *self.keys, *self.occurred_at, *self.context.values(), *self.reading.values())
         return sorted({column for column in named if column is not None})
 
 
@@ -82,17 +105,18 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
             "The columns of no signal were found: name a preset, or send a mapping from columns to signals.",
             code="layout-unknown",
         )
-    time, factor = _time(mapping, headings, "time" in required)
     return Layout(
         signals=signals,
-        time=time,
-        time_factor=factor,
+        clock=_clock(mapping, headings, "time" in required, own=all(signal.clock for signal in signals.values())),
         keys=_keys(mapping, headings, "group_by" in required),
         external_id=_optional("external_id", mapping.external_id, headings, required),
         athlete=_optional("athlete", mapping.athlete, headings, required),
         device=_optional("device", mapping.device, headings, required),
-        session_id=_optional("session_id", mapping.session_id, headings, required),
         occurred_at=_occurred_at(mapping, headings, "occurred_at" in required),
+        context=_context(mapping, headings, required),
+        reading=_named("reading", mapping.reading, headings, required),
+        unscorable=_optional("unscorable", mapping.unscorable, headings, required),
+        time_base=_optional("time_base", mapping.time_base, headings, required),
     )
 
 
@@ -108,7 +132,28 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: bo
         if components[axis] is None:
             raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)
-    return SignalLayout(unit=_unit(name, columns), components=(x, y, z))
+    first = min(component.column for component in (x, y, z) if component.column is not None)
+    return SignalLayout(
+        unit=_unit(name, columns),
+        components=(x, y, z),
+        clock=_own_clock(name, columns, headings, first, required=required),
+        resultant=None if columns.resultant is None else headings.find(columns.resultant),
+        sample_rate_hz=columns.sample_rate_hz,
+        full_scale=columns.range,
+    )
+
+
+def _own_clock(
+    name: SignalName, columns: SignalColumns, headings: Headings, first: int, *, required: bool
+) -> Clock | None:
+    """The signal's own column of stamps: the nearest before its samples, where several have its heading."""
+    for time in columns.time or ():
+        column = headings.nearest(time.column, first)
+        if column is not None:
+            return Clock(column, TIME_UNITS[time.unit])
+    if required and columns.time:
+        raise _missing(f"The column of the times of {name} was not found.", f"/{name}/time")
+    return None
 
 
 def _unit(name: SignalName, columns: SignalColumns) -> str:
@@ -131,14 +176,35 @@ def _component(spellings: Sequence[str] | None, headings: Headings) -> Component
     return None
 
 
-def _time(mapping: Mapping, headings: Headings, required: bool) -> tuple[int | None, float]:
-    for time in mapping.time or ():
+def _clock(mapping: Mapping, headings: Headings, required: bool, *, own: bool) -> Clock | None:
+    """The column of stamps that the signals share; none is looked for where each has its own."""
+    for time in () if own else mapping.time or ():
         column = headings.find([time.column])
         if column is not None:
-            return column, TIME_UNITS[time.unit]
-    if required:
+            return Clock(column, TIME_UNITS[time.unit])
+    if required and not own:
         raise _missing("The column of the time was not found.", "/time")
-    return None, 1.0
+    return None
+
+
+def _context(mapping: Mapping, headings: Headings, required: frozenset[str]) -> dict[str, int]:
+    session = _optional("session_id", mapping.session_id, headings, required)
+    found = _named("context", mapping.context, headings, required)
+    return found if session is None else found | {"session_id": session}
+
+
+def _named(
+    name: str, columns: dict[Any, list[str]] | None, headings: Headings, required: frozenset[str]
+) -> dict[str, int]:
+    """The columns of a table of fields, as far as they are there."""
+    found: dict[str, int] = {}
+    for field, spellings in (columns or {}).items():
+        column = headings.find(spellings)
+        if column is not None:
+            found[field] = column
+        elif name in required:
+            raise _missing(f"The column of {field} was not found.", f"/{name}/{field}")
+    return found
 
 
 def _keys(mapping: Mapping, headings: Headings, required: bool) -> tuple[int, ...]:

@@ -23,8 +23,8 @@ from headimpact_service.ingest.impact_json import (
 )
 
 MAX_SPELLINGS = 20
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-"""Units of a time column, in seconds."""
+TIME_UNITS = {"s": 1e3, "ms": 1.0, "us": 1e-3}
+"""Units of a time column, in milliseconds."""
 
 
 def _as_list(value: Any) -> Any:  # noqa: ANN401 - validated after
@@ -36,13 +36,32 @@ Heading = Annotated[str, Field(min_length=1, max_length=200)]
 Spellings = Annotated[list[Heading], Field(min_length=1, max_length=MAX_SPELLINGS), BeforeValidator(_as_list)]
 
 
+class TimeColumn(Strict):
+    """A column of stamps."""
+
+    column: Heading
+    unit: Literal["s", "ms", "us"]
+
+
+Times = Annotated[list[TimeColumn], Field(min_length=1, max_length=MAX_SPELLINGS), BeforeValidator(_as_list)]
+
+
 class SignalColumns(Strict):
-    """The columns of one signal; a `-` before a heading turns the component's sign."""
+    """The columns of one signal; a `-` before a heading turns the component's sign.
+
+    `time` and `sample_rate_hz` are for a sensor that has its own. Of several columns of times with one heading, a
+    signal's is the nearest before its own; its rows end where both its time and its samples are empty. `resultant` is
+    the device's own, to be compared with that of the samples.
+    """
 
     unit: str | None = None
     x: Spellings | None = None
     y: Spellings | None = None
     z: Spellings | None = None
+    time: Times | None = None
+    sample_rate_hz: float | None = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
+    range: float | None = Field(None, gt=0, description="Full scale of the sensor, in `unit`.")
+    resultant: Spellings | None = None
 
 
 class LinearAccelerationColumns(SignalColumns):
@@ -63,16 +82,6 @@ class AngularAccelerationColumns(SignalColumns):
     unit: Literal["rad/s^2", "deg/s^2"] | None = None
 
 
-class TimeColumn(Strict):
-    """A column of stamps."""
-
-    column: Heading
-    unit: Literal["s", "ms", "us"]
-
-
-Times = Annotated[list[TimeColumn], Field(min_length=1, max_length=MAX_SPELLINGS), BeforeValidator(_as_list)]
-
-
 class DateAndTime(Strict):
     """An instant that is spread over two columns: an ISO date and a time of day."""
 
@@ -80,11 +89,39 @@ class DateAndTime(Strict):
     time: Spellings
 
 
+ContextField = Literal[
+    "session_id",
+    "activity",
+    "sport",
+    "position",
+    "event_definition",
+    "video_verified",
+    "worn",
+    "sensor_type",
+    "firmware",
+    "linear_acceleration_range_g",
+    "angular_velocity_range_rad_s",
+    "trigger_threshold_g",
+    "post_trigger_ms",
+    "on_board_filter",
+    "level",
+    "sex",
+    "age_years",
+]
+ReadingField = Literal[
+    "axes", "filter", "constrained_plane", "pre_trigger_ms", "mounting", "sample_rate_hz", "fill_gaps"
+]
+
+
 class Mapping(Strict):
     """How a table is read. Every field is optional: a request's mapping may complete or correct a preset's.
 
     `zero` says what the stamps count from: `record_start` (their first is the record's start), `trigger` (time zero is
     the trigger). Left out, stamps that run from before zero to after it count from the trigger, others from the start.
+
+    `context` and `reading` are columns of what an impact says of itself: its context, and how its samples are to be
+    read, each as in the JSON of an impact; the impact's first row counts. `time_base` parts the rows of an impact whose
+    signals do not share their times: rows with one value in it go together, and a signal is in one part only.
     """
 
     linear_acceleration: LinearAccelerationColumns | None = None
@@ -99,12 +136,17 @@ class Mapping(Strict):
     athlete: Spellings | None = None
     device: Spellings | None = None
     session_id: Spellings | None = None
+    context: dict[ContextField, Spellings] | None = None
+    reading: dict[ReadingField, Spellings] | None = None
+    unscorable: Spellings | None = None
+    time_base: Spellings | None = None
     occurred_at: Spellings | DateAndTime | None = None
     axes: Axes | None = None
     location: Location | None = None
     mounting: MountingBody | None = None
     constrained_plane: Plane | None = None
     filter: Filter | None = None
+    fill_gaps: bool | None = None
     skip_rows: int | None = Field(None, ge=0, le=1000, description="Lines above the headings.")
     drop_rows: int | None = Field(None, ge=0, le=1000, description="Samples to drop at the start of each impact.")
 

@@ -9,6 +9,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from headimpact.recording import AXES, FloatArray, Signal
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.digest import content_digest
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
@@ -124,8 +127,34 @@ def _preview(scored: Scored) -> dict[str, Any]:
         "device": record.device_serial,
         "occurred_at": record.occurred_at,
         "kinematics": kinematics_document(describe(record)),
+        "as_sent": {name: _as_sent(signal) for name, signal in record.recording.signals()},
         "source": dict(record.metadata),
         "state": document["state"],
         "peaks": document["peaks"],
         "quality": document["quality"],
     }
+
+
+def _as_sent(signal: Signal) -> dict[str, Any]:
+    """A signal as its file has it: what a sender recognises before anything is converted, filtered or turned."""
+    count = signal.values.shape[0]
+    if signal.time_s is None:
+        rate = signal.sample_rate_hz or 0.0
+        duration_s = (count - 1) / rate if rate else 0.0
+    else:
+        duration_s = float(signal.time_s[-1] - signal.time_s[0]) if count else 0.0
+        rate = (count - 1) / duration_s if duration_s else 0.0
+    return {
+        "unit": signal.unit,
+        "samples": count,
+        "sample_rate_hz": rate,
+        "duration_ms": duration_s * 1000.0,
+        "range": signal.declared_range,
+        "peak": {axis: _peak(signal.values[:, column]) for column, axis in enumerate(AXES)},
+    }
+
+
+def _peak(values: FloatArray) -> float | None:
+    """The value of largest magnitude, with its sign; None of a channel without any."""
+    known = values[np.isfinite(values)]
+    return float(known[np.abs(known).argmax()]) if known.size else None

@@ -9,9 +9,20 @@ from pydantic import BaseModel, Field
 
 from headimpact_service.problem_shapes import ProblemDocument
 from headimpact_service.routes.impact_shapes import KinematicsView
-from headimpact_service.routes.score_shapes import PeaksView, QualityView
+from headimpact_service.routes.score_shapes import AxesView, PeaksView, QualityView
 
 Status = Literal["created", "unchanged", "failed", "readable"]
+
+
+class AsSentView(BaseModel):
+    """A signal as its file has it: before units, filters and axes."""
+
+    unit: str
+    samples: int
+    sample_rate_hz: float = Field(description="Of jittered stamps, their mean.")
+    duration_ms: float
+    range: float | None = Field(description="The sensor's full scale, where it is known.")
+    peak: AxesView = Field(description="By axis the value of largest magnitude, with its sign.")
 
 
 class PreviewView(BaseModel):
@@ -21,6 +32,7 @@ class PreviewView(BaseModel):
     device: str | None
     occurred_at: datetime | None
     kinematics: KinematicsView
+    as_sent: dict[str, AsSentView]
     source: dict[str, Any]
     state: Literal["scored", "unscorable"]
     peaks: PeaksView

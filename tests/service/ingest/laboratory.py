@@ -90,6 +90,8 @@ def dts(
     before: int | None = 10,
     time_column: bool = True,
     delimiter: str = ",",
+    samples: int = SAMPLES,
+    length: int = 12,
     changes: Mapping[str, Sequence[object]] | None = None,
 ) -> str:
     """An export: the gyroscope's channels first, z before y before x."""
@@ -104,7 +106,7 @@ def dts(
         "Engineering Unit": [unit for unit, _ in columns.values()],
         "Software Filter": ["NONE"] * count,
         "Sample Rate (Hz)": [f"{rate_hz:g}"] * count,
-        "Number of Pts (Total)": [SAMPLES] * count,
+        "Number of Pts (Total)": [samples] * count,
         "Pre-zero Data Pts": [] if before is None else [before] * count,
         "Scale Factor (EU/Cnt)": [0.01] * count,
     }
@@ -112,7 +114,7 @@ def dts(
     rows = [[key, *values] for key, values in header.items() if values]
     if time_column:
         rows.append(["Time (sec)", *columns])
-    waves = np.stack([half_sine(SAMPLES, peak) for _, peak in columns.values()], axis=1)
-    for index, samples in enumerate(waves.tolist()):
-        rows.append([*([(index - (before or 0)) / rate_hz] if time_column else []), *samples])
+    waves = np.stack([half_sine(samples, peak, 10, length) for _, peak in columns.values()], axis=1)
+    for index, values in enumerate(waves.tolist()):
+        rows.append([*([(index - (before or 0)) / rate_hz] if time_column else []), *values])
     return "\r\n".join(delimiter.join(map(str, row)) for row in rows) + "\r\n"

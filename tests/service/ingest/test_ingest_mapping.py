@@ -73,7 +73,7 @@ def test_a_mapping_may_set_everything_else():
     recording = record.recording
     assert recording.axes == "sae_j211"
     assert recording.low_pass.linear_acceleration == "CFC180"
-    assert recording.pre_trigger_ms == 5.0
+    assert recording.pre_trigger_ms == 3.0  # of 5 ms before the trigger the first two samples were dropped
     assert recording.constrained_plane == "sagittal"
     assert recording.mounting is not None
     assert recording.linear_acceleration is not None

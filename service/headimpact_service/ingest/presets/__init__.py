@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from headimpact.recording import AXES, SIGNALS
+from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import invalid_parameter
 from headimpact_service.ingest.headings import Headings, Vocabulary
 from headimpact_service.ingest.impact_json import FilterBody, Strict
@@ -23,7 +23,7 @@ class Preset(Strict):
 
     `recognised` says that a table with these headings is this device's without anyone naming the preset; that needs
     headings which name their units or are the device's alone. `requires` is what the layout cannot say and the sender
-    must.
+    must; `usual_rate_hz` is what the device samples at, to be known and not to be assumed.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
@@ -32,7 +32,9 @@ class Preset(Strict):
     format: Literal["table", "nhtsa", "iso_mme", "dts"] = "table"
     recognised: bool = False
     requires: list[Requirement] = Field(default_factory=list)
+    usual_rate_hz: dict[SignalName, float] = Field(default_factory=dict)
     notes: list[str] = Field(default_factory=list)
+    file_name: str | None = Field(None, description="A pattern of names without their ending, with what they tell.")
     mapping: Mapping
     vocabulary: dict[str, Any] | None = None
 
@@ -56,6 +58,9 @@ def _vocabulary(name: str) -> Vocabulary:
 
 
 def _is_there(columns: SignalColumns, headings: Headings) -> bool:
+    """Whether a signal's three columns are there, and its times where it has its own."""
+    if columns.time and all(headings.nearest(time.column, 0) is None for time in columns.time):
+        return False
     spellings = [getattr(columns, axis) for axis in AXES]
     return all(names is not None and headings.find(names) is not None for names in spellings)
 
@@ -102,12 +107,36 @@ def _shown(preset: Preset) -> dict[str, Any]:
         "location": mapping.location or "head_cg",
         "filter": _filter_shown(mapping),
         "sample_rate_hz": mapping.sample_rate_hz,
+        "usual_rate_hz": dict(preset.usual_rate_hz),
+        "ranges": _ranges_shown(mapping),
         "pre_trigger_ms": mapping.pre_trigger_ms,
-        "time": [time.model_dump() for time in mapping.time or ()],
+        "time": _times_shown(mapping),
+        "drop_rows": mapping.drop_rows or 0,
+        "file_name": preset.file_name,
         "group_by": list(mapping.group_by or ()),
         "columns": _columns_shown(preset),
         "notes": list(preset.notes),
     }
+
+
+def _ranges_shown(mapping: Mapping) -> dict[str, Any]:
+    """The sensors' full scales, where the layout's signals are those of the sensors."""
+    found = {signal: columns for signal in SIGNALS if (columns := mapping.columns_of(signal)) is not None}
+    return {
+        signal: {"range": columns.range, "unit": columns.unit} for signal, columns in found.items() if columns.range
+    }
+
+
+def _times_shown(mapping: Mapping) -> list[dict[str, Any]]:
+    """The columns of times: those that all signals share, and those of one signal."""
+    shared: list[dict[str, Any]] = [{"signal": None, **time.model_dump()} for time in mapping.time or ()]
+    own = ((signal, mapping.columns_of(signal)) for signal in SIGNALS)
+    return shared + [
+        {"signal": signal, **time.model_dump()}
+        for signal, columns in own
+        if columns is not None
+        for time in columns.time or ()
+    ]
 
 
 def _filter_shown(mapping: Mapping) -> Any:  # noqa: ANN401 - as in an impact: a name or an object
@@ -122,6 +151,11 @@ def _columns_shown(preset: Preset) -> list[dict[str, Any]]:
         if (signal_columns := preset.mapping.columns_of(signal)) is not None
         for axis in AXES
     ]
+    columns += [
+        {"signal": signal, "axis": "resultant", "unit": signal_columns.unit, "headings": signal_columns.resultant}
+        for signal in SIGNALS
+        if (signal_columns := preset.mapping.columns_of(signal)) is not None and signal_columns.resultant
+    ]
     if preset.vocabulary is not None:
         columns += [_vocabulary_shown(signal, preset.vocabulary[signal]) for signal in SIGNALS]
     return columns + _labels_shown(preset.mapping)
@@ -134,8 +168,10 @@ def _vocabulary_shown(signal: str, words: dict[str, Any]) -> dict[str, Any]:
 
 def _labels_shown(mapping: Mapping) -> list[dict[str, Any]]:
     labels: list[dict[str, Any]] = []
-    for name in ("external_id", "athlete", "device", "session_id", "occurred_at"):
+    for name in ("external_id", "athlete", "device", "session_id", "occurred_at", "unscorable", "time_base"):
         spellings = getattr(mapping, name)
         parts = [spellings.date, spellings.time] if isinstance(spellings, DateAndTime) else [spellings]
         labels += [{"field": name, "headings": part} for part in parts if part is not None]
+    for table in (mapping.context, mapping.reading):
+        labels += [{"field": field, "headings": spellings} for field, spellings in (table or {}).items()]
     return labels

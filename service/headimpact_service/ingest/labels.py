@@ -1,0 +1,101 @@
+"""What a table says of an impact beside its samples: names, when it was, its context, how it is to be read."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+from functools import lru_cache
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, ValidationError
+from pydantic_core import from_json
+
+from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest.impact_json import (
+    MAX_NAME,
+    MAX_RATE_HZ,
+    MIN_RATE_HZ,
+    PRINTABLE,
+    Axes,
+    Context,
+    Filter,
+    MountingBody,
+    Plane,
+    Strict,
+)
+from headimpact_service.ingest.json_faults import payload_errors
+from headimpact_service.ingest.times import TimeError, instant
+
+_PRINTABLE = re.compile(PRINTABLE)
+Texts = tuple[tuple[str, str], ...]
+"""Fields and their cells, those that are empty left out."""
+
+
+def _json(value: Any) -> Any:  # noqa: ANN401 - validated after
+    """An object in a cell is JSON."""
+    return from_json(value) if isinstance(value, str) and value.startswith("{") else value
+
+
+class Reading(Strict):
+    """How an impact's samples are to be read, as its row says; each field as in the JSON of an impact."""
+
+    axes: Axes | None = None
+    filter: Annotated[Filter, BeforeValidator(_json)] | None = None
+    constrained_plane: Plane | None = None
+    pre_trigger_ms: float | None = Field(None, ge=0.0, le=60_000.0)
+    mounting: Annotated[MountingBody, BeforeValidator(_json)] | None = None
+    sample_rate_hz: float | None = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
+    fill_gaps: bool = False
+
+
+NOTHING_SAID = Reading.model_validate({})
+
+
+@lru_cache(maxsize=1024)
+def reading_of(texts: Texts) -> Reading:
+    """The cells as they are meant; 422 for one that breaks the rule of its field."""
+    try:
+        return Reading.model_validate(dict(texts), strict=False)
+    except ValueError as error:
+        raise _cell_problem(error, "reading") from None
+
+
+@lru_cache(maxsize=1024)
+def context_of(texts: Texts) -> dict[str, Any]:
+    """The context that the cells make."""
+    try:
+        return Context.model_validate(dict(texts), strict=False).model_dump(exclude_none=True)
+    except ValidationError as error:
+        raise _cell_problem(error, "context") from None
+
+
+def _cell_problem(error: ValueError, where: str) -> Problem:
+    if not isinstance(error, ValidationError):
+        return label_fault(f"A cell of the mapping's {where} is not JSON.", "not-json", parameter=where)
+    [fault, *_] = payload_errors(error.errors(include_url=False, include_input=False), None)
+    field = error.errors(include_url=False, include_input=False)[0]["loc"][0]
+    return label_fault(f"The column of {field}: {fault.detail}", fault.code, parameter=str(field))
+
+
+def checked_name(text: str | None, field: str) -> str | None:
+    """A name as the sender gives it, unless it breaks the rules of names."""
+    if text is not None and (len(text) > MAX_NAME or _PRINTABLE.match(text) is None):
+        raise label_fault(f"A name has 1 to {MAX_NAME} printable characters.", "name-form", parameter=field)
+    return text
+
+
+def moment(parts: list[str | None], time_zone: str | None) -> datetime | None:
+    """The instant of one cell, or of a date's and a time's."""
+    if not any(parts):
+        return None
+    text = (parts[0] or "").replace("/", "-") + "".join(f"T{part}" for part in parts[1:])
+    try:
+        return instant(text, time_zone)
+    except TimeError as error:
+        detail = f"{error} If the file's own time is broken, give occurred_at beside the file."
+        raise label_fault(detail, error.code, parameter=error.field) from None
+
+
+def label_fault(detail: str, code: str, parameter: str | None = None) -> Problem:
+    """The 422 for an impact of a table."""
+    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code=code, parameter=parameter)])

@@ -1,0 +1,301 @@
+"""One impact of a table: its rows, laid out by the mapping, into a record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from headimpact.filtering import PAPER
+from headimpact.quality import QualityNote, check_reported_resultant
+from headimpact.recording import Mounting, Recording, Signal, SignalName
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
+from headimpact_service.ingest.impact_json import MAX_SAMPLES
+from headimpact_service.ingest.impact_reading import low_pass, mounting
+from headimpact_service.ingest.labels import (
+    NOTHING_SAID,
+    Reading,
+    checked_name,
+    context_of,
+    label_fault,
+    moment,
+    reading_of,
+)
+from headimpact_service.ingest.layout import Layout, SignalLayout
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.table import Columns, FloatArray
+from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
+from headimpact_service.ingest.windows import Rows, Window
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How one table is read: its mapping, where that came from, and what the sender overrides."""
+
+    mapping: Mapping
+    preset: str | None
+    required: frozenset[str]
+    options: ImportOptions
+    format: str
+    named: NamedFacts = NOT_NAMED
+
+
+class Samples:
+    """A window's columns, put together into signals once for all its impacts."""
+
+    def __init__(self, layout: Layout, window: Window) -> None:
+        """Assemble every signal."""
+        columns = window.columns
+        self.layout, self.window, self.texts, self.numbers = layout, window, columns.texts, columns.numbers
+        self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
+        self._finite = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
+
+    def require_finite(self, columns: list[int], rows: Rows, first: int) -> None:
+        """Refuse rows in which a cell is not a finite number."""
+        if self._finite:
+            return
+        for column in columns:
+            faulty = np.flatnonzero(~np.isfinite(self.numbers[column][rows]))
+            if faulty.size:
+                raise label_fault(
+                    f"A cell of column {column + 1} is not a finite number, at sample {faulty[0]} of the impact that "
+                    f"begins in row {first + 1} below the headings.",
+                    "missing-sample",
+                )
+
+
+def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
+    """A signal's three columns with their signs; one that a constrained plane leaves out is zero."""
+    values = np.zeros((columns.rows, 3))
+    for axis, component in enumerate(signal.components):
+        if component.column is not None:
+            np.multiply(columns.numbers[component.column], component.sign, out=values[:, axis])
+    return values
+
+
+class TableImpact:
+    """One impact of a table."""
+
+    def __init__(self, plan: Plan, samples: Samples, number: int) -> None:
+        """Take an impact's rows; nothing is read yet."""
+        self.plan, self.samples, self.layout = plan, samples, samples.layout
+        self.mapping, self.options = plan.mapping, plan.options
+        window = samples.window
+        self.rows = window.impacts[number]
+        self.first = self.rows.start if isinstance(self.rows, slice) else self.rows[0]
+        self.cell = self.first if window.columns.lengths is None else number
+        self.notes: list[QualityNote] = []
+
+    def record(self) -> ImpactRecord:
+        """The impact, with what the sender gave beside the file in place of what the file says."""
+        options, named = self.options, self.plan.named
+        unscorable = self._text(self.layout.unscorable)
+        recording = self._recording(scorable=unscorable is None)
+        return ImpactRecord(
+            recording=recording,
+            external_id=self._name("external_id", self.layout.external_id) or named.external_id,
+            athlete_external_id=options.athlete or self._name("athlete", self.layout.athlete),
+            occurred_at=options.occurred_at or self._occurred_at() or named.occurred_at,
+            device_serial=options.device or self._name("device", self.layout.device) or named.device,
+            context=self._context(),
+            metadata=self._metadata(),
+            notes=tuple(self.notes),
+            unscorable=() if unscorable is None else (unscorable,),
+            needs_device_mounting=self.mapping.location == "sensor" and recording.mounting is None,
+        )
+
+    def sent_name(self) -> str | None:
+        """What the file calls the impact."""
+        try:
+            return self._name("external_id", self.layout.external_id) or self.plan.named.external_id
+        except Problem:
+            return None
+
+    @cached_property
+    def reading(self) -> Reading:
+        """What the impact's first row says of how to read it."""
+        return self._reading_at(self.cell)
+
+    def _reading_at(self, cell: int) -> Reading:
+        columns = self.layout.reading
+        if not columns:
+            return NOTHING_SAID
+        cells = ((field, self.samples.texts[column][cell].strip()) for field, column in columns.items())
+        return reading_of(tuple((field, text) for field, text in cells if text))
+
+    def _recording(self, *, scorable: bool) -> Recording:
+        mapping, options, reading = self.mapping, self.options, self.reading
+        fill_gaps = options.fill_gaps or reading.fill_gaps or bool(mapping.fill_gaps)
+        tracks = self._tracks()
+        for track in tracks:
+            self._require_whole(track, samples=scorable and not fill_gaps)
+        # The signals before the drop say when the record began, those after it when what is kept begins.
+        kept = [self._without_first(track) for track in tracks]
+        signals: dict[str, Any] = {
+            track.name: self._signal(track, base) for track, base in zip(kept, time_bases(kept), strict=True)
+        }
+        chosen = reading.filter or mapping.filter
+        return Recording(
+            axes=options.axes or reading.axes or mapping.axes or "anatomical",
+            mounting=self._mounting(),
+            constrained_plane=reading.constrained_plane or mapping.constrained_plane,
+            low_pass=options.low_pass or (PAPER if chosen is None else low_pass(chosen)),
+            pre_trigger_ms=self._pre_trigger_ms(tracks, kept),
+            fill_gaps=fill_gaps,
+            **signals,
+        )
+
+    def _mounting(self) -> Mounting | None:
+        """The mounting that the row or the layout brings; None where none is needed, or the device's is."""
+        if self.reading.mounting is not None:
+            return mounting(self.reading.mounting, "/mounting")
+        if self.mapping.location != "sensor" or self.mapping.mounting is None:
+            return None
+        return mounting(self.mapping.mounting, "/mounting")
+
+    def _tracks(self) -> list[Track]:
+        """The rows of each signal: all of the impact's, unless these are parted by time base."""
+        if self.layout.time_base is None:
+            return [self._track(name, self.rows, self.reading) for name in self.layout.signals]
+        tracks: list[Track] = []
+        for rows in self._parts(self.layout.time_base):
+            reading = self._reading_at(rows.start if isinstance(rows, slice) else rows[0])
+            tracks += [
+                self._track(name, rows, reading)
+                for name, values in self.samples.signals.items()
+                if not np.isnan(values[rows]).all()
+            ]
+        if len({track.name for track in tracks}) < len(tracks):
+            raise label_fault("A signal's samples stand in one part of its impact only.", "time-base")
+        if not tracks:
+            raise label_fault("The impact has no samples.", "no-signal")
+        return tracks
+
+    def _parts(self, column: int) -> Iterator[Rows]:
+        """Rows of the impact that follow each other with one value in the column."""
+        cells = self.samples.texts[column]
+        if self.samples.window.columns.lengths is not None:
+            yield self.rows
+            return
+        rows = range(self.rows.start, self.rows.stop) if isinstance(self.rows, slice) else self.rows
+        for _, run in groupby(rows, key=lambda row: cells[row].strip()):
+            part = list(run)
+            yield slice(part[0], part[-1] + 1) if part[-1] - part[0] + 1 == len(part) else part
+
+    def _track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
+        signal = self.layout.signals[name]
+        clock = signal.clock or self.layout.clock
+        rate = self.options.sample_rate_hz or reading.sample_rate_hz
+        if clock is None:
+            return Track(name, rows, rate or signal.sample_rate_hz or self.mapping.sample_rate_hz, None, 1.0)
+        if signal.clock is not None:
+            rows = self._until_empty(signal, clock.column, rows)
+        return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
+
+    def _stamps(self, column: int, rows: Rows) -> FloatArray:
+        """The stamps of rows; signals that share both share the array."""
+        key = (column, rows.start, rows.stop) if isinstance(rows, slice) else (column, rows[0], rows[-1])
+        return self._kept_stamps.setdefault(key, self.samples.numbers[column][rows])
+
+    @cached_property
+    def _kept_stamps(self) -> dict[tuple[int, int, int], FloatArray]:
+        return {}
+
+    def _until_empty(self, signal: SignalLayout, clock: int, rows: Rows) -> Rows:
+        """A signal's rows without those behind its end, which the columns of a longer one go on beside."""
+        columns = [clock, *signal.columns]
+        there = np.logical_or.reduce([~np.isnan(self.samples.numbers[column][rows]) for column in columns])
+        count = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
+        return slice(rows.start, rows.start + count) if isinstance(rows, slice) else rows[:count]
+
+    def _require_whole(self, track: Track, *, samples: bool) -> None:
+        """Refuse a missing time, and a missing sample unless it is to be filled or never to be scored."""
+        signal = self.layout.signals[track.name]
+        clock = signal.clock or self.layout.clock
+        columns = ([] if clock is None or track.rate is not None else [clock.column]) + (
+            signal.columns if samples else []
+        )
+        self.samples.require_finite(columns, track.rows, self.samples.window.first + self.first)
+
+    def _without_first(self, track: Track) -> Track:
+        """A track without the samples that the layout calls corrupt, which is noted once."""
+        dropped = self.mapping.drop_rows or 0
+        if not dropped:
+            return track
+        if not self.notes:
+            detail = f"The first {dropped} of the file's samples were left out, as its layout says."
+            self.notes.append(QualityNote("edge_glitch", "note", detail))
+        rows = track.rows
+        kept: Rows = slice(rows.start + dropped, rows.stop) if isinstance(rows, slice) else rows[dropped:]
+        stamps = None if track.stamps is None else track.stamps[dropped:]
+        return Track(track.name, kept, track.rate, stamps, track.milliseconds)
+
+    def _pre_trigger_ms(self, tracks: list[Track], kept: list[Track]) -> float | None:
+        """The time before the trigger: as said for this impact or by the sender, by the stamps, or by the layout."""
+        if self.reading.pre_trigger_ms is not None:
+            return self.reading.pre_trigger_ms
+        stated = self.mapping.pre_trigger_ms
+        if stated is not None:
+            stated = max(0.0, round(stated - self._dropped_ms(tracks, kept), 9))
+        starts = [start for track in kept if (start := track.start_ms) is not None]
+        if not starts or "pre_trigger_ms" in self.plan.required:
+            return stated
+        spans_zero = min(starts) < 0.0 <= max(end for track in kept if (end := track.end_ms) is not None)
+        zero = self.mapping.zero or ("trigger" if spans_zero else "record_start")
+        if zero == "record_start":
+            return stated
+        if not spans_zero and min(starts) != 0.0:
+            detail = "The record's times must include zero, which its layout says is the trigger."
+            raise label_fault(detail, "time-zero")
+        return round(-min(starts), 9) + 0.0
+
+    def _dropped_ms(self, tracks: list[Track], kept: list[Track]) -> float:
+        """How much later than the file's record the one that is kept begins."""
+        if not self.mapping.drop_rows:
+            return 0.0
+        before, after = ([s for t in of if (s := t.start_ms) is not None] for of in (tracks, kept))
+        if before and after:
+            return min(after) - min(before)
+        return min((1000.0 * self.mapping.drop_rows / track.rate for track in kept if track.rate), default=0.0)
+
+    def _signal(self, track: Track, base: TimeBase) -> Signal:
+        layout = self.layout.signals[track.name]
+        # A copy, so that one impact that is kept does not keep the whole table.
+        values = self.samples.signals[track.name][track.rows].copy()
+        if values.shape[0] > MAX_SAMPLES:
+            raise label_fault(f"An impact may have at most {MAX_SAMPLES} samples.", "sample-count")
+        if layout.resultant is not None:
+            reported = self.samples.numbers[layout.resultant][track.rows]
+            self.notes += check_reported_resultant(track.name, layout.unit, reported, values)
+        return Signal(values, layout.unit, *base, layout.full_scale)
+
+    def _text(self, column: int | None) -> str | None:
+        if column is None:
+            return None
+        return self.samples.texts[column][self.cell].strip() or None
+
+    def _name(self, field: str, column: int | None) -> str | None:
+        return checked_name(self._text(column), field)
+
+    def _context(self) -> dict[str, Any]:
+        cells = ((field, self._text(column)) for field, column in self.layout.context.items())
+        texts = tuple((field, text) for field, text in cells if text is not None)
+        return dict(context_of(texts)) if texts else {}
+
+    def _occurred_at(self) -> datetime | None:
+        columns = self.layout.occurred_at
+        if not columns or self.options.occurred_at is not None:
+            return None
+        return moment([self._text(column) for column in columns], self.options.time_zone)
+
+    def _metadata(self) -> dict[str, Any]:
+        told = {"format": self.plan.format, "preset": self.plan.preset, "file": self.options.filename}
+        return {name: value for name, value in told.items() if value is not None}

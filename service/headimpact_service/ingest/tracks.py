@@ -1,0 +1,81 @@
+"""The times of one impact's signals in a table: each has its rows, and a rate or stamps for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from headimpact.recording import SignalName
+from headimpact_service.ingest.stamps import nominal_rate
+from headimpact_service.ingest.table import FloatArray
+from headimpact_service.ingest.windows import Rows
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """One signal's rows; `rate` [Hz] is stated, `stamps` are as written, in units of so many milliseconds."""
+
+    name: SignalName
+    rows: Rows
+    rate: float | None
+    stamps: FloatArray | None
+    milliseconds: float
+
+    @property
+    def first_stamp(self) -> float | None:
+        """The first stamp, as written."""
+        return None if self.stamps is None or not self.stamps.size else float(self.stamps[0])
+
+    @property
+    def start_ms(self) -> float | None:
+        """The first stamp [ms]."""
+        return None if self.first_stamp is None else self.first_stamp * self.milliseconds
+
+    @property
+    def end_ms(self) -> float | None:
+        """The last stamp [ms]."""
+        return None if self.stamps is None or not self.stamps.size else float(self.stamps[-1]) * self.milliseconds
+
+
+TimeBase = tuple[float | None, FloatArray | None]
+"""A rate [Hz], or the stamps [s] where they say none."""
+
+
+def time_bases(tracks: Sequence[Track]) -> list[TimeBase]:
+    """The rate of each track, as stated or as its uniform stamps say, else its stamps.
+
+    A rate that is only said by stamps stands for them where all such tracks begin together: a rate says nothing of
+    when a signal begins.
+    """
+    stamped = [track for track in tracks if track.rate is None and track.stamps is not None]
+    times = {id(track.stamps): _seconds(track, _origin(stamped)) for track in stamped}
+    together = len({float(seconds[0]) for seconds in times.values() if seconds.size}) <= 1
+    rates = {key: nominal_rate(seconds) if together else None for key, seconds in times.items()}
+    bases: list[TimeBase] = []
+    for track in tracks:
+        if track.rate is not None or track.stamps is None:
+            bases.append((track.rate, None))
+        else:
+            rate = rates[id(track.stamps)]
+            bases.append((rate, times[id(track.stamps)] if rate is None else None))
+    return bases
+
+
+def _origin(stamped: Sequence[Track]) -> float:
+    """What is taken off the stamps before they are scaled: counts of hours would lose their last digits.
+
+    Milliseconds are not scaled but divided by 1000, as everywhere: they stay as they are.
+    """
+    units = {track.milliseconds for track in stamped}
+    if len(units) != 1 or units == {1.0}:
+        return 0.0
+    return min(
+        (float(track.stamps[0]) for track in stamped if track.stamps is not None and track.stamps.size), default=0.0
+    )
+
+
+def _seconds(track: Track, origin: float) -> FloatArray:
+    stamps = np.empty(0) if track.stamps is None else track.stamps
+    return (stamps if track.milliseconds == 1.0 else (stamps - origin) * track.milliseconds) / 1000.0
