@@ -32,8 +32,13 @@ Texts = tuple[tuple[str, str], ...]
 
 
 def _json(value: Any) -> Any:  # noqa: ANN401 - validated after
-    """An object in a cell is JSON."""
-    return from_json(value) if isinstance(value, str) and value.startswith("{") else value
+    """An object in a cell is JSON; what only looks like one is refused as text."""
+    if not isinstance(value, str) or not value.startswith("{"):
+        return value
+    try:
+        return from_json(value)
+    except ValueError:
+        return value
 
 
 class Reading(Strict):
@@ -56,8 +61,8 @@ def reading_of(texts: Texts) -> Reading:
     """The cells as they are meant; 422 for one that breaks the rule of its field."""
     try:
         return Reading.model_validate(dict(texts), strict=False)
-    except ValueError as error:
-        raise _cell_problem(error, "reading") from None
+    except ValidationError as error:
+        raise _cell_problem(error) from None
 
 
 @lru_cache(maxsize=1024)
@@ -66,15 +71,13 @@ def context_of(texts: Texts) -> dict[str, Any]:
     try:
         return Context.model_validate(dict(texts), strict=False).model_dump(exclude_none=True)
     except ValidationError as error:
-        raise _cell_problem(error, "context") from None
+        raise _cell_problem(error) from None
 
 
-def _cell_problem(error: ValueError, where: str) -> Problem:
-    if not isinstance(error, ValidationError):
-        return label_fault(f"A cell of the mapping's {where} is not JSON.", "not-json", parameter=where)
-    [fault, *_] = payload_errors(error.errors(include_url=False, include_input=False), None)
-    field = error.errors(include_url=False, include_input=False)[0]["loc"][0]
-    return label_fault(f"The column of {field}: {fault.detail}", fault.code, parameter=str(field))
+def _cell_problem(error: ValidationError) -> Problem:
+    faults = error.errors(include_url=False, include_input=False)
+    fault, field = payload_errors(faults[:1], None)[0], str(faults[0]["loc"][0])
+    return label_fault(f"The column of {field}: {fault.detail}", fault.code, parameter=field)
 
 
 def checked_name(text: str | None, field: str) -> str | None:

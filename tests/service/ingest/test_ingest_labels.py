@@ -1,0 +1,191 @@
+"""What a table says of its impacts beside the samples: names, context, how to read them, their own peaks."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ingest_files import codes, csv_text, one, read, refused, six_axis
+from making import MAKERS, columns, motion, resultant
+
+from headimpact.filtering import NO_FILTER
+from headimpact_service.ingest.file_names import NOT_NAMED, named_facts
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.presets import presets
+
+PREVENT = presets()["prevent"].file_name
+MOUNTING = {"accelerometer": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "offset_mm": [70, 0, -10]}}
+
+
+def labelled(**labels: object) -> str:
+    """Quoted as CSV wants it."""
+    quoted = {name: '"' + str(value).replace('"', '""') + '"' for name, value in labels.items()}
+    return csv_text(before=quoted)
+
+
+class TestReading:
+    def test_an_impact_may_say_how_it_is_to_be_read(self):
+        recording = one(
+            labelled(
+                axes="sae_j211",
+                filter="none",
+                constrained_plane="sagittal",
+                pre_trigger_ms=7.5,
+                sample_rate_hz=1562.5,
+                mounting=json.dumps(MOUNTING),
+                fill_gaps="true",
+            )
+        ).recording
+        assert (recording.axes, recording.low_pass, recording.constrained_plane) == ("sae_j211", NO_FILTER, "sagittal")
+        assert (recording.pre_trigger_ms, recording.fill_gaps) == (7.5, True)
+        assert recording.linear_acceleration.sample_rate_hz == 1562.5
+        assert recording.mounting.offset_m.tolist() == [0.07, 0.0, -0.01]
+
+    def test_a_filter_may_be_an_object(self):
+        recording = one(labelled(filter='{"linear_acceleration": 300, "angular_velocity": "CFC180"}')).recording
+        assert (recording.low_pass.linear_acceleration, recording.low_pass.angular_velocity) == (300, "CFC180")
+
+    def test_each_impact_of_a_file_says_its_own(self):
+        first = labelled(impact_id="a", filter="none")
+        second = labelled(impact_id="b", filter="paper").split("\n", 1)[1]
+        assert [r.recording.low_pass.name for r in read(first + second)] == ["none", "paper"]
+
+    def test_what_comes_beside_the_file_counts_more_and_an_empty_cell_says_nothing(self):
+        assert one(labelled(axes="sae_j211"), axes="anatomical").recording.axes == "anatomical"
+        assert (
+            one(labelled(filter="none", sample_rate_hz=900), sample_rate_hz=800.0)
+            .recording.signals()[0][1]
+            .sample_rate_hz
+            == 800
+        )
+        assert one(labelled(axes="", filter="", mounting="")).recording.axes == "anatomical"
+
+    @pytest.mark.parametrize(
+        ("field", "cell", "code"),
+        [
+            ("axes", "upside_down", "not-allowed"),
+            ("filter", "strong", "not-allowed"),
+            ("filter", "{", "not-allowed"),
+            ("filter", '{"linear_acceleration": -3}', "out-of-range"),
+            ("mounting", "{}", "missing"),
+            ("mounting", "left", "wrong-type"),
+            ("sample_rate_hz", "fast", "wrong-type"),
+            ("sample_rate_hz", "100", "out-of-range"),
+            ("sample_rate_hz", "nan", "out-of-range"),
+            ("pre_trigger_ms", "-1", "out-of-range"),
+            ("constrained_plane", "oblique", "not-allowed"),
+        ],
+    )
+    def test_a_cell_that_breaks_its_rule_is_that_impact_s_422(self, field, cell, code):
+        problem = refused(labelled(**{field: cell}))
+        assert problem.status == 422
+        assert [error.code for error in problem.errors] in ([code], ["not-finite"])
+        assert cell == "{" or cell not in problem.detail
+
+    def test_an_improper_rotation_is_refused(self):
+        mirrored = {"accelerometer": MOUNTING["accelerometer"] | {"rotation": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]}}
+        assert refused(labelled(mounting=json.dumps(mirrored))).slug == "improper-rotation"
+
+    def test_an_unscorable_record_says_why_and_may_lack_samples(self):
+        lines = labelled(unscorable="Channel x failed.").splitlines()
+        lines[8] = ",".join([*lines[8].split(",")[:2], "", *lines[8].split(",")[3:]])
+        record = one("\n".join(lines))
+        assert record.unscorable == ("Channel x failed.",)
+        assert np.isnan(record.recording.linear_acceleration.values[7, 0])
+
+
+class TestContext:
+    def test_the_context_comes_from_columns_of_its_names(self):
+        record = one(labelled(session_id="s-1", activity="game", worn="false", age_years="17.5", firmware="2.1"))
+        assert record.context == {
+            "session_id": "s-1",
+            "activity": "game",
+            "worn": False,
+            "age_years": 17.5,
+            "firmware": "2.1",
+        }
+
+    def test_a_mapping_may_name_others(self):
+        mapping = Mapping.model_validate({"context": {"worn": "In mouth", "position": ["Pos", "Role"]}})
+        record = one(labelled(**{"In mouth": "0", "Role": "LB"}), mapping=mapping)
+        assert record.context == {"worn": False, "position": "LB"}
+        problem = refused(csv_text(), mapping=mapping)
+        assert codes(problem) == [("/context/worn", "column-missing")]
+
+    @pytest.mark.parametrize(
+        ("field", "cell"), [("worn", "perhaps"), ("age_years", "old"), ("sex", "many"), ("level", "a\x07")]
+    )
+    def test_a_cell_that_breaks_its_rule_is_422_and_names_the_field(self, field, cell):
+        problem = refused(labelled(**{field: cell}))
+        assert [error.parameter for error in problem.errors] == [field]
+        assert cell not in problem.detail
+
+
+class TestResultants:
+    @pytest.mark.parametrize("name", ["prevent", "swa"])
+    def test_a_device_s_own_resultants_are_compared(self, name):
+        made = MAKERS[name][0]()
+        options = {"sample_rate_hz": 1000.0, "occurred_at": datetime(2026, 1, 1, tzinfo=UTC)} if name == "swa" else {}
+        assert read(made.data, **options)[0].notes == ()
+
+    def test_one_that_differs_is_named_with_both_numbers(self):
+        a = motion(100, 1000.0, 20)["linear_acceleration"]
+        wrong = resultant(a).copy()
+        wrong[25] += 5.0
+        mapping = Mapping.model_validate(
+            {
+                "linear_acceleration": {"unit": "g", "x": "x", "y": "y", "z": "z", "resultant": "r"},
+                "sample_rate_hz": 1000,
+            }
+        )
+        (note,) = one(columns(["x", "y", "z", "r"], [a, wrong]), mapping=mapping).notes
+        assert note.code == "vendor_peak_mismatch"
+        assert f"{wrong[25]:.5g} g" in note.detail
+        assert f"{wrong[25] - 5.0:.5g} g" in note.detail
+
+
+class TestFileNames:
+    @pytest.mark.parametrize(
+        "name",
+        [
+            "MG0042-17-2026-11-20T19:04:05.123Z.csv",
+            "MG0042-17-2026-11-20T19-04-05.123Z.csv",
+            "mg0042-17-20261120T190405.123Z.csv",
+            "MG0042-17-2026-11-20T21_04_05.123+02_00.csv",
+            "folder/MG0042-17-2026-11-20 19.04.05,123Z.CSV",
+        ],
+    )
+    def test_device_time_and_name_come_from_a_file_s_name(self, name):
+        facts = named_facts(name, PREVENT, None)
+        assert facts.device == "0042"
+        assert facts.occurred_at == datetime(2026, 11, 20, 19, 4, 5, 123_000, UTC)
+        assert facts.external_id == name.rpartition("/")[2].rpartition(".")[0]
+
+    def test_a_local_time_needs_the_zone_beside_the_file(self):
+        name = "MG0042-17-2026-11-20T19:04:05.csv"
+        assert named_facts(name, PREVENT, None).occurred_at is None
+        assert named_facts(name, PREVENT, "Europe/Dublin").occurred_at == datetime(2026, 11, 20, 19, 4, 5, tzinfo=UTC)
+
+    @pytest.mark.parametrize("name", [None, "export.csv", "MG0042.csv", "MG0042-17.csv", "XMG1-2-2026.csv"])
+    def test_any_other_name_says_nothing(self, name):
+        assert named_facts(name, PREVENT, None) == NOT_NAMED
+
+    @given(st.text(max_size=60))
+    def test_no_name_is_a_fault(self, text):
+        named_facts(f"MG{text}", PREVENT, "Europe/Dublin")
+
+    def test_a_column_counts_more_than_the_name(self):
+        found = motion()
+        data = MAKERS["prevent"][0]().data.decode().splitlines()
+        data = [f"device,{data[0]}", *(f"mg-7,{line}" for line in data[1:])]
+        mapping = Mapping.model_validate({"device": "device"})
+        record = one("\n".join(data), filename="MG0042-17-2026-11-20T190405Z.csv", mapping=mapping)
+        assert record.device_serial == "mg-7"
+        assert found["linear_acceleration"].shape == record.recording.linear_acceleration.values.shape
+
+    def test_only_the_preset_that_says_so_reads_names(self):
+        assert one(csv_text(six_axis()), filename="MG0042-17-2026-11-20T190405Z.csv").device_serial is None
