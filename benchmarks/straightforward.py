@@ -7,7 +7,7 @@ between impacts.
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid, trapezoid
+from scipy.integrate import cumulative_trapezoid, solve_ivp, trapezoid
 from scipy.signal import lsim
 
 INERTIA = np.array([0.016, 0.024, 0.022])
@@ -51,7 +51,22 @@ def brain_angles(alpha, rate):
     return np.array(peaks)
 
 
-def criteria(a, w, alpha, rate):
+def brain_angles_by_integration(alpha, rate):
+    """The same equations of motion through scipy.integrate.solve_ivp, as they are often solved."""
+    time = np.arange(len(alpha)) / rate
+    peaks = []
+    for i in range(3):
+        squared, damping = DAMPED[i] ** 2 + DECAY[i] ** 2, 2 * DECAY[i]
+
+        def motion(t, state, i=i, squared=squared, damping=damping):
+            return [state[1], -np.interp(t, time, alpha[:, i]) - damping * state[1] - squared * state[0]]
+
+        found = solve_ivp(motion, (0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-6, atol=1e-9, max_step=1 / rate)
+        peaks.append(np.max(np.abs(found.y[0])))
+    return np.array(peaks)
+
+
+def criteria(a, w, alpha, rate, angles=brain_angles):
     """Values of the thirteen criteria: a in g, w in rad/s, alpha in rad/s^2, n x 3 each."""
     dt = 1 / rate
     resultant = np.linalg.norm(a, axis=1)
@@ -73,7 +88,7 @@ def criteria(a, w, alpha, rate):
         "hip3d": power.max(axis=0),
         "gambit": np.max(np.sqrt((angular / 25000) ** 2 + (resultant / 250) ** 2)),
         "vtcp": 1 / (1 + np.exp(10.2 - 0.0433 * pla - 0.000873 * paa + 9.2e-7 * pla * paa)),
-        "bam": brain_angles(alpha, rate),
+        "bam": angles(alpha, rate),
     }
 
 
