@@ -100,7 +100,9 @@ class Load:
         while not self.stopped.wait(max(0.0, due - time.monotonic())):
             due += 1 / self.rate
             number += 1
-            body = {"kinematics": kinematics(1 + number % 97 / 100)}
+            body: dict[str, Any] = {"kinematics": kinematics(1 + number % 97 / 100)}
+            if self.path == "/v1/impacts":
+                body |= {"athlete": {"external_id": "p-1"}}
             start = time.perf_counter()
             self.client.post(self.path, json=body).raise_for_status()
             self.times_ms.append((time.perf_counter() - start) * 1e3)

@@ -19,7 +19,7 @@ from typing import Any
 
 from headimpact_service.errors import Problem
 
-NICE = 10
+NICE = 5
 """Requests of the parent come first."""
 Task = Callable[[dict[str, Any]], Iterator[Any]]
 
