@@ -126,9 +126,11 @@ class CsvTable:
 
     def _cells(self, lines: list[str], index: int) -> list[str]:
         """One column of text; equal cells, as in the names of impacts, are one string."""
-        known: dict[str, str] = {}
-        cells = (line.split(self._delimiter, index + 1)[index].rstrip("\r\n") for line in lines)
-        return [known.setdefault(cell, cell) for cell in cells]
+        cells = [line.split(self._delimiter, index + 1)[index] for line in lines]
+        if index == len(self.headings) - 1:
+            cells = [cell.rstrip("\r\n") for cell in cells]
+        known = dict(zip(cells, cells, strict=True))
+        return list(map(known.__getitem__, cells))
 
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
         """A block cell by cell, saying what is wrong with it."""

@@ -7,7 +7,10 @@ from enum import Enum
 
 from headimpact_service.errors import Problem
 
-READ = "CSV (also of DTS), JSON, NDJSON, and ISO-MME and NHTSA crash tests (zip)"
+READ = (
+    "CSV (also of DTS), JSON, NDJSON, Parquet, Arrow IPC, MATLAB (-v7), xlsx, npz, "
+    "and ISO-MME and NHTSA crash tests (zip)"
+)
 
 
 class Kind(Enum):
@@ -19,18 +22,24 @@ class Kind(Enum):
     CSV = "csv"
     PARQUET = "parquet"
     ARROW = "arrow"
+    MAT = "mat"
 
 
 _BINARY = {
     b"\x1f\x8b": "gzip",
-    b"PAR1": "Parquet",
-    b"ARROW1": "Arrow IPC",
-    b"MATLAB 5.0": "MATLAB",
-    b"\x89HDF\r\n\x1a\n": "HDF5 (MATLAB v7.3)",
     b"\xd0\xcf\x11\xe0": "an old Excel workbook",
     b"\x93NUMPY": "npy",
     b"%PDF": "PDF",
 }
+_READ_BINARY = {
+    b"PAR1": Kind.PARQUET,
+    b"ARROW1\0\0": Kind.ARROW,
+    b"\xff\xff\xff\xff": Kind.ARROW,  # a stream: the mark before each message
+    b"MATLAB 5.0 MAT-file": Kind.MAT,
+}
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_HDF5_PLACES = (0, 512, 1024, 2048)
+_MAT_73 = b"MATLAB 7.3 MAT-file"
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 HEAD = 64 * 1024
 """The bytes of a file that tell its kind."""
@@ -51,6 +60,9 @@ def detect(data: bytes, *, filename: str | None = None, content_type: str | None
         raise Problem("unreadable-file", "The file is empty.")
     if data.startswith(_ZIP):
         return Kind.ZIP
+    known = next((kind for magic, kind in _READ_BINARY.items() if data.startswith(magic)), None)
+    if known is not None:
+        return known
     _refuse_binary(data)
     if head.startswith((b"{", b"[")):
         return Kind.NDJSON if _is_ndjson(head, filename, content_type) else Kind.JSON
@@ -58,6 +70,12 @@ def detect(data: bytes, *, filename: str | None = None, content_type: str | None
 
 
 def _refuse_binary(data: bytes) -> None:
+    if data.startswith(_MAT_73) or any(data.startswith(_HDF5, place) for place in _HDF5_PLACES):
+        raise Problem(
+            "unsupported-media-type",
+            "This file is HDF5, as MATLAB writes with -v7.3, and is not read because its links can lead to other "
+            f"files: save it with -v7. Files that are read: {READ}.",
+        )
     for magic, name in _BINARY.items():
         if data.startswith(magic):
             raise Problem("unsupported-media-type", f"This file is {name}; files that are read: {READ}.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import BinaryIO
 
 from pydantic_core import from_json
@@ -25,8 +25,13 @@ MAX_LINE = 8 * 1024 * 1024
 def read_ndjson(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
     """The impacts of an NDJSON file; empty lines are passed over."""
     refuse_table_options(options, "NDJSON")
+    return read_lines(_lines(source), options)
+
+
+def read_lines(lines: Iterable[tuple[int, bytes]], options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
+    """The impacts of lines with their numbers."""
     count = 0
-    for number, line in _lines(source):
+    for number, line in lines:
         count += 1
         if count > options.max_impacts:
             raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")

@@ -58,6 +58,11 @@ class Samples:
         self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
         self._finite = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
 
+    @property
+    def has_ends(self) -> bool:
+        """Whether a signal may end before its impact does: arrays and lists of unlike lengths."""
+        return self.window.columns.lengths is not None and not self._finite
+
     def require_finite(self, columns: list[int], rows: Rows, first: int) -> None:
         """Refuse rows in which a cell is not a finite number."""
         if self._finite:
@@ -164,7 +169,7 @@ class TableImpact:
     def _tracks(self) -> list[Track]:
         """The rows of each signal: all of the impact's, unless these are parted by time base."""
         if self.layout.time_base is None:
-            return [self._track(name, self.rows, self.reading) for name in self.layout.signals]
+            return [self._track(name, self.rows, self.reading) for name in self._present()]
         tracks: list[Track] = []
         for rows in self._parts(self.layout.time_base):
             reading = self._reading_at(rows.start if isinstance(rows, slice) else rows[0])
@@ -178,6 +183,13 @@ class TableImpact:
         if not tracks:
             raise label_fault("The impact has no samples.", "no-signal")
         return tracks
+
+    def _present(self) -> list[SignalName]:
+        """The signals of the impact: where the format parts impacts, one without any sample is not there."""
+        signals = self.samples.signals
+        if not self.samples.has_ends:
+            return list(signals)
+        return [name for name, values in signals.items() if not np.isnan(values[self.rows]).all()] or list(signals)
 
     def _parts(self, column: int) -> Iterator[Rows]:
         """Rows of the impact that follow each other with one value in the column."""
@@ -194,10 +206,10 @@ class TableImpact:
         signal = self.layout.signals[name]
         clock = signal.clock or self.layout.clock
         rate = self.options.sample_rate_hz or reading.sample_rate_hz
+        if signal.clock is not None or self.samples.has_ends:
+            rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         if clock is None:
             return Track(name, rows, rate or signal.sample_rate_hz or self.mapping.sample_rate_hz, None, 1.0)
-        if signal.clock is not None:
-            rows = self._until_empty(signal, clock.column, rows)
         return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
 
     def _stamps(self, column: int, rows: Rows) -> FloatArray:
@@ -209,9 +221,9 @@ class TableImpact:
     def _kept_stamps(self) -> dict[tuple[int, int, int], FloatArray]:
         return {}
 
-    def _until_empty(self, signal: SignalLayout, clock: int, rows: Rows) -> Rows:
+    def _until_empty(self, signal: SignalLayout, clock: int | None, rows: Rows) -> Rows:
         """A signal's rows without those behind its end, which the columns of a longer one go on beside."""
-        columns = [clock, *signal.columns]
+        columns = signal.columns if clock is None else [clock, *signal.columns]
         there = np.logical_or.reduce([~np.isnan(self.samples.numbers[column][rows]) for column in columns])
         count = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
         return slice(rows.start, rows.start + count) if isinstance(rows, slice) else rows[:count]

@@ -10,6 +10,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.binary_formats import (
+    is_npz,
+    is_xlsx,
+    read_arrow,
+    read_mat,
+    read_npz,
+    read_parquet,
+    read_xlsx,
+)
 from headimpact_service.ingest.csv_format import read_csv
 from headimpact_service.ingest.detect import HEAD, READ, Kind, detect
 from headimpact_service.ingest.dts import PRESET as DTS
@@ -70,6 +79,11 @@ def _read_zip(source: Source, options: ImportOptions) -> Impacts:
             if fits(archive.names):
                 yield from read(archive, options)
                 return
+        names = archive.names
+    for fits, read_whole in ZIPPED:
+        if fits(names):
+            yield from read_whole(source, options)
+            return
     raise Problem("unsupported-media-type", f"The zip archive holds none of the files that are read: {READ}.")
 
 
@@ -78,8 +92,16 @@ READERS: dict[Kind, Callable[[Source, ImportOptions], Impacts]] = {
     Kind.JSON: read_json,
     Kind.NDJSON: read_ndjson,
     Kind.ZIP: _read_zip,
+    Kind.PARQUET: read_parquet,
+    Kind.ARROW: read_arrow,
+    Kind.MAT: read_mat,
 }
 ARCHIVES: tuple[tuple[Callable[[list[str]], bool], Callable[[GuardedZip, ImportOptions], Impacts]], ...] = (
     (is_nhtsa, read_nhtsa),
     (is_iso_mme, read_iso_mme),
 )
+ZIPPED: tuple[tuple[Callable[[list[str]], bool], Callable[[Source, ImportOptions], Impacts]], ...] = (
+    (is_xlsx, read_xlsx),
+    (is_npz, read_npz),
+)
+"""Formats that are zip archives themselves."""

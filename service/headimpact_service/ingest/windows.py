@@ -11,7 +11,7 @@ import numpy as np
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.table import Columns
 
-WINDOW_ROWS = 262_144
+WINDOW_ROWS = 65_536
 """A file of no more rows may mix the rows of its impacts as it likes; in a longer one they stand near each other."""
 MAX_ROWS = 200_000_000
 

@@ -11,8 +11,10 @@ import stat
 import struct
 import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import PurePosixPath
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from headimpact_service.errors import Problem
 
@@ -66,14 +68,23 @@ class GuardedZip:
 
     def read(self, name: str) -> bytes:
         """One file, inflated; 422 where it is broken or the archive's budget is spent."""
-        entry = self._entries[name]
-        self._budget -= entry.file_size
+        self._budget -= self.size(name)
         if self._budget < 0:
             raise _unreadable(f"At most {MAX_READ} bytes are read from one zip archive.")
+        with self.open(name) as file:
+            # A bound on what is asked for is one on what inflates: a size that lies ends as a broken file.
+            return file.read(self.size(name) + 1)
+
+    def size(self, name: str) -> int:
+        """What one file inflates to, as the directory says [bytes]."""
+        return self._entries[name].file_size
+
+    @contextmanager
+    def open(self, name: str) -> Iterator[BinaryIO]:
+        """One file as a stream that inflates as it is read; 422 where it is broken."""
         try:
-            with self._archive.open(entry) as file:
-                # A bound on what is asked for is one on what inflates: a size that lies ends as a broken file.
-                return file.read(entry.file_size + 1)
+            with self._archive.open(self._entries[name]) as file:
+                yield cast("BinaryIO", file)
         except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, struct.error, OSError):
             raise _unreadable("A file of the zip archive is broken.") from None
 

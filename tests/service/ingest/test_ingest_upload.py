@@ -25,6 +25,10 @@ from headimpact_service.ingest.upload import READERS
         (b'{"a":\n {"b": 1}\n}', Kind.JSON),
         (b"a,b\n1,2\n", Kind.CSV),
         (b"\xe9,b\n1,2\n", Kind.CSV),
+        (b"PAR1" + b"\0" * 8, Kind.PARQUET),
+        (b"ARROW1\0\0", Kind.ARROW),
+        (b"\xff\xff\xff\xff\x10\0\0\0", Kind.ARROW),
+        (b"MATLAB 5.0 MAT-file, Platform: x", Kind.MAT),
     ],
 )
 def test_the_content_tells_the_kind(data: bytes, kind: Kind):
@@ -40,10 +44,10 @@ def test_every_kind_has_its_reader():
     ("data", "named"),
     [
         (gzip.compress(b"a,b\n", mtime=0), "gzip"),
-        (b"PAR1" + b"\0" * 8, "Parquet"),
-        (b"ARROW1\0\0", "Arrow IPC"),
-        (b"MATLAB 5.0 MAT-file, Platform: x", "MATLAB"),
-        (b"\x89HDF\r\n\x1a\n", "HDF5"),
+        (b"\x89HDF\r\n\x1a\n", "save it with -v7"),
+        (b"\0" * 512 + b"\x89HDF\r\n\x1a\n", "HDF5"),
+        (b"MATLAB 7.3 MAT-file, Platform: x", "save it with -v7"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook"),
         (b"%PDF-1.7", "PDF"),
         (b"\x7fELF\0\0\0", "not known"),
         ("a,b\n1,2".encode("utf-16"), "not known"),

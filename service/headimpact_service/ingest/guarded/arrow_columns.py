@@ -1,0 +1,165 @@
+"""Arrow columns as a table: one row a sample, or one row an impact whose columns are lists of samples."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
+from headimpact_service.ingest.table import Columns, FloatArray
+
+UNIT_KEYS = (b"unit", b"units")
+ROWS_AT_ONCE = 8192
+MAX_LIST = 20_001
+"""Of a longer list this much is read: one sample more than an impact may have, which is then refused by name."""
+_EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
+
+Batches = Callable[[list[int]], Iterator[pa.RecordBatch]]
+"""Reads the columns of these places, in their order, batch by batch."""
+
+
+def is_number(kind: pa.DataType) -> bool:
+    """Whether cells of this type are numbers."""
+    types = pa.types
+    return bool(types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind))
+
+
+def is_list_of_numbers(kind: pa.DataType) -> bool:
+    """Whether cells of this type are lists of samples."""
+    types = pa.types
+    lists = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
+    return bool(lists and is_number(kind.value_type))
+
+
+class ArrowTable:
+    """A table over batches of Arrow columns."""
+
+    def __init__(self, schema: pa.Schema, batches: Batches) -> None:
+        """Look at the schema only."""
+        self.headings = checked_headings(schema.names)
+        self._types = list(schema.types)
+        self._batches = batches
+        self.units = {place: unit for place, field in enumerate(schema) if (unit := _unit(field)) is not None}
+        self.parted = any(map(is_list_of_numbers, self._types))
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
+        """The asked-for columns; those of lists end to end, with the length of each impact."""
+        wanted = sorted({*numbers, *texts})
+        for place in numbers:
+            self._require_numbers(place)
+        for batch in self._batches(wanted):
+            columns = {place: batch.column(index) for index, place in enumerate(wanted)}
+            if self.parted:
+                yield from _impacts(columns, numbers, texts)
+            elif batch.num_rows:
+                cells = {place: floats(columns[place]) for place in numbers}
+                yield Columns(batch.num_rows, cells, {place: words(columns[place]) for place in texts})
+
+    def _require_numbers(self, place: int) -> None:
+        kind = self._types[place]
+        if not (is_number(kind) or is_list_of_numbers(kind)):
+            raise unreadable(f"Column {place + 1} holds no numbers.")
+
+
+def floats(column: pa.Array) -> FloatArray:
+    """A column of numbers; NaN where a cell is empty."""
+    cast = column.cast(pa.float64(), safe=False)
+    return np.ascontiguousarray(cast.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def words(column: pa.Array) -> list[str]:
+    """A column as text: names and numbers as they are, times as RFC 3339 has them; empty where a cell is."""
+    encoded = column if isinstance(column, pa.DictionaryArray) else column.dictionary_encode()
+    known = [checked_text(text) for text in _texts(encoded.dictionary)] + [""]
+    codes = pc.fill_null(encoded.indices.cast(pa.int64()), len(known) - 1).to_numpy(zero_copy_only=False)
+    return [known[code] for code in codes.tolist()]
+
+
+def _texts(values: pa.Array) -> list[str]:
+    kind = values.type
+    if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_integer(kind):
+        return ["" if value is None else str(value) for value in values.to_pylist()]
+    if pa.types.is_floating(kind):
+        return ["" if value is None else f"{value:.17g}" for value in values.to_pylist()]
+    if pa.types.is_timestamp(kind):
+        micros = values.cast(pa.timestamp("us", kind.tz), safe=False).cast(pa.int64()).to_pylist()
+        return ["" if value is None else _instant(value, placed=kind.tz is not None) for value in micros]
+    if pa.types.is_date(kind):
+        return ["" if value is None else value.isoformat() for value in values.to_pylist()]
+    raise unreadable("A column that is to be read as text holds something else.")
+
+
+def _instant(microseconds: int, *, placed: bool) -> str:
+    try:
+        moment = _EPOCH + dt.timedelta(microseconds=microseconds)
+    except OverflowError:
+        return "out of range"
+    return moment.isoformat() if placed else moment.replace(tzinfo=None).isoformat()
+
+
+def _unit(field: pa.Field) -> str | None:
+    metadata = field.metadata or {}
+    stated = next((metadata[key] for key in UNIT_KEYS if key in metadata), None)
+    return None if stated is None else checked_text(stated.decode("utf-8", "replace"))
+
+
+class _Lists:
+    """One column of lists: where each list lies in the values of all."""
+
+    def __init__(self, column: pa.Array) -> None:
+        self.lengths = pc.fill_null(pc.list_value_length(column), 0).to_numpy(zero_copy_only=False).astype(np.int64)
+        self.starts = np.cumsum(self.lengths) - self.lengths
+        self._values = floats(column.flatten())
+
+    def laid_out(self, first: int, rooms: np.ndarray[Any, np.dtype[np.int64]]) -> FloatArray:
+        """The lists from the `first` on, each in the room it is given, NaN where it is shorter."""
+        last = first + rooms.size
+        lengths, starts = np.minimum(self.lengths[first:last], rooms), self.starts[first:last]
+        if np.array_equal(lengths, rooms) and np.array_equal(lengths, self.lengths[first:last]):
+            return self._values[starts[0] : starts[-1] + lengths[-1]]
+        room = np.full(int(rooms.sum()), np.nan)
+        room[_places(np.cumsum(rooms) - rooms, lengths)] = self._values[_places(starts, lengths)]
+        return room
+
+
+def _places(
+    starts: np.ndarray[Any, np.dtype[np.int64]], lengths: np.ndarray[Any, np.dtype[np.int64]]
+) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """`starts[0]`, `starts[0] + 1`, … as many as the first length says, then those of the second, and so on."""
+    before = np.cumsum(lengths) - lengths
+    return np.repeat(starts - before, lengths) + np.arange(int(lengths.sum()))
+
+
+def _impacts(columns: dict[int, pa.Array], numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
+    """The impacts of a batch, no more rows at a time than a block of samples has."""
+    lists = {place: _Lists(columns[place]) for place in numbers if not is_number(columns[place].type)}
+    scalars = {place: floats(columns[place]) for place in numbers if place not in lists}
+    names = {place: words(columns[place]) for place in texts}
+    if not lists:
+        raise unreadable("No column of lists is read: the table's rows are impacts, and hold no samples.")
+    rooms = np.minimum(np.max([column.lengths for column in lists.values()], axis=0), MAX_LIST)
+    for first, last in _portions(rooms):
+        room = rooms[first:last]
+        cells = {
+            place: lists[place].laid_out(first, room) if place in lists else np.repeat(scalars[place][first:last], room)
+            for place in numbers
+        }
+        cut = {place: column[first:last] for place, column in names.items()}
+        yield Columns(int(room.sum()), cells, cut, lengths=room.tolist())
+
+
+def _portions(rooms: np.ndarray[Any, np.dtype[np.int64]]) -> Iterator[tuple[int, int]]:
+    """Impacts that fit into a block together, at least one."""
+    first = rows = 0
+    for place, room in enumerate(rooms.tolist()):
+        if rows and rows + room > ROWS_AT_ONCE:
+            yield first, place
+            first, rows = place, 0
+        rows += room
+    if first < rooms.size:
+        yield first, rooms.size

@@ -1,0 +1,208 @@
+"""NumPy archives: plain arrays only. An array of Python objects would be a pickle, and is refused by its header."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from headimpact_service.ingest.guarded.array_table import ArrayTable, Fact, Samples
+from headimpact_service.ingest.guarded.contents import MAX_TEXT, Content, NamedTable, checked_text, unreadable
+from headimpact_service.ingest.table import FloatArray
+from headimpact_service.ingest.zip_guard import GuardedZip
+
+UNIT = "_unit"
+SUFFIX = ".npy"
+MAX_HEADER = 4096
+MAX_FACTS = 16 * 1024 * 1024
+MAX_WIDTH = 64
+_TIMES = ("t", "time", "stamp")
+
+
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """One array of the archive, by its header."""
+
+    name: str
+    file: str
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    by_columns: bool
+    header: int
+
+    @property
+    def is_text(self) -> bool:
+        """Whether its cells are text or times."""
+        return self.dtype.kind in "USM"
+
+    @property
+    def is_unit(self) -> bool:
+        """Whether it says the unit of another array."""
+        return self.is_text and self.shape == () and self.name.endswith(UNIT)
+
+
+def contents(stream: BinaryIO) -> Iterator[Content]:
+    """All arrays of the archive as one table."""
+    archive = GuardedZip(stream)
+    members = [_member(archive, name) for name in archive.names]
+    units = {m.name.removesuffix(UNIT): _texts(archive, m)[0] for m in members if m.is_unit}
+    yield NamedTable(None, _table(archive, [member for member in members if not member.is_unit], units))
+
+
+def warm_up() -> None:
+    """Read a file of our own, so that every library is loaded."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, a=np.zeros((2, 3, 3)), external_id=np.array(["x", "y"]), a_unit=np.array("g"))
+    for content in contents(buffer):
+        if isinstance(content, NamedTable):
+            list(content.table.blocks([0], [3]))
+
+
+def _member(archive: GuardedZip, file: str) -> _Member:
+    if not file.endswith(SUFFIX):
+        raise unreadable("An npz archive holds nothing but arrays (.npy).")
+    with archive.open(file) as stream:
+        try:
+            version = np.lib.format.read_magic(stream)
+            read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+            shape, by_columns, dtype = read(stream, max_header_size=MAX_HEADER)
+        except (ValueError, KeyError, SyntaxError, RecursionError, EOFError):
+            raise unreadable("The header of an array in the npz archive is broken.") from None
+        header = stream.tell()
+    if dtype.hasobject:
+        raise unreadable("The npz archive holds Python objects (pickles), which are never read: save plain arrays.")
+    if dtype.kind not in "fiubUSM":
+        raise unreadable("The arrays of an npz archive hold numbers, text or times.")
+    member = _Member(file.removesuffix(SUFFIX), file, tuple(shape), dtype, by_columns, header)
+    if member.header + _size(member) != archive.size(file):
+        raise unreadable("The size of an array in the npz archive is not the one its header says.")
+    return member
+
+
+def _size(member: _Member) -> int:
+    size = int(member.dtype.itemsize)
+    for count in member.shape:
+        size *= count
+    return size
+
+
+def _table(archive: GuardedZip, members: list[_Member], units: dict[str, str]) -> ArrayTable:
+    shaped = [member for member in members if not member.is_text and len(member.shape) in (2, 3)]
+    if not shaped:
+        raise unreadable("The npz archive holds no array of samples: impacts x samples x components.")
+    if any(len(member.shape) > 3 for member in members):
+        raise unreadable("An array has at most three dimensions: impacts x samples x components.")
+    several = any(len(member.shape) == 3 for member in shaped)
+    samples = [_samples(archive, member, several=several) for member in shaped]
+    impacts, lengths = samples[0].impacts, {array.length for array in samples}
+    facts: list[Fact] = []
+    for member in members:
+        if len(member.shape) == 1 and not member.is_text and _is_along_samples(member, impacts, lengths):
+            samples.append(_repeated(archive, member, impacts))
+        elif len(member.shape) <= 1:
+            facts.append(_fact(archive, member, impacts))
+    # A signal's own times are looked for before it.
+    samples.sort(key=lambda array: array.width != 1)
+    return ArrayTable(samples, facts, units)
+
+
+def _is_along_samples(member: _Member, impacts: int, lengths: set[int]) -> bool:
+    """Whether a plain row of numbers has one for each sample; where both fit, times do."""
+    if member.shape[0] not in lengths:
+        return False
+    return member.shape[0] != impacts or member.name.lower().startswith(_TIMES)
+
+
+def _samples(archive: GuardedZip, member: _Member, *, several: bool) -> Samples:
+    """An array of samples: three dimensions as they are; two of them one impact's, or one component of several."""
+    if member.by_columns and _size(member) > MAX_FACTS:
+        raise unreadable("A large array must be stored by rows (C order).")
+    if len(member.shape) == 3:
+        impacts, length, width = member.shape
+    elif several:
+        (impacts, length), width = member.shape, 1
+    else:
+        impacts, (length, width) = 1, member.shape
+    if width > MAX_WIDTH or width < 1:
+        raise unreadable(f"The last dimension of an array of samples is its 1 to {MAX_WIDTH} components.")
+    stream = _Rows(archive, member, (length, width))
+    return Samples(member.name, impacts, length, width, stream.take)
+
+
+def _repeated(archive: GuardedZip, member: _Member, impacts: int) -> Samples:
+    """Times that all impacts share."""
+    row = _numbers(archive, member).reshape(1, -1, 1)
+    return Samples(member.name, impacts, row.shape[1], 1, lambda count: np.repeat(row, count, axis=0))
+
+
+def _fact(archive: GuardedZip, member: _Member, impacts: int) -> Fact:
+    if member.shape not in ((), (1,), (impacts,)):
+        raise unreadable("An array of one dimension has a value for each impact or for each sample.")
+    if member.is_text:
+        return Fact(member.name, None, _texts(archive, member))
+    numbers = _numbers(archive, member)
+    return Fact(member.name, numbers, [f"{number:.17g}" for number in numbers.reshape(-1).tolist()])
+
+
+class _Rows:
+    """An array read impact by impact, as it inflates."""
+
+    def __init__(self, archive: GuardedZip, member: _Member, shape: tuple[int, int]) -> None:
+        self._archive, self._member, self._shape = archive, member, shape
+        self._open = ExitStack()
+        self._stream: BinaryIO | None = None
+        self._held: FloatArray | None = None
+        self._taken = 0
+
+    def take(self, count: int) -> FloatArray:
+        """The samples of the next `count` impacts."""
+        if self._member.by_columns:
+            return self._from_whole(count)
+        if self._stream is None:
+            self._stream = self._open.enter_context(self._archive.open(self._member.file))
+            self._stream.read(self._member.header)
+        length, width = self._shape
+        wanted = count * length * width * self._member.dtype.itemsize
+        data = self._stream.read(wanted)
+        if len(data) != wanted:
+            raise unreadable("An array of the npz archive is cut off.")
+        return np.frombuffer(data, self._member.dtype).astype(np.float64).reshape(count, length, width)
+
+    def _from_whole(self, count: int) -> FloatArray:
+        if self._held is None:
+            self._held = _numbers(self._archive, self._member).reshape(-1, *self._shape)
+        self._taken += count
+        return self._held[self._taken - count : self._taken]
+
+
+def _numbers(archive: GuardedZip, member: _Member) -> FloatArray:
+    return _whole(archive, member).astype(np.float64)
+
+
+def _texts(archive: GuardedZip, member: _Member) -> list[str]:
+    """Text as it is; times as RFC 3339 has them, in UTC."""
+    if member.dtype.itemsize > 4 * MAX_TEXT:
+        raise unreadable(f"A text may have at most {MAX_TEXT} characters.")
+    values = _whole(archive, member).reshape(-1)
+    if member.dtype.kind == "M":
+        return ["" if text == "NaT" else f"{text}Z" for text in np.datetime_as_string(values, unit="us").tolist()]
+    if member.dtype.kind == "S":
+        values = np.char.decode(values, "latin-1")
+    texts = [checked_text(text) for text in values.tolist()]
+    return texts or [""]
+
+
+def _whole(archive: GuardedZip, member: _Member) -> np.ndarray[Any, np.dtype[Any]]:
+    if _size(member) > MAX_FACTS:
+        raise unreadable(f"Only arrays of samples may have more than {MAX_FACTS} bytes.")
+    with archive.open(member.file) as stream:
+        stream.read(member.header)
+        data = stream.read(_size(member))
+    if len(data) != _size(member):
+        raise unreadable("An array of the npz archive is cut off.")
+    array = np.frombuffer(data, member.dtype)
+    return array.reshape(member.shape, order="F" if member.by_columns else "C")

@@ -1,0 +1,172 @@
+"""Workbooks (xlsx): each sheet a table. Formulas are not computed: a cell is the value that was saved with it.
+
+A sheet may hold words above its headings, and a second block of columns below the first, as devices write that have
+two sensors; blocks are read side by side, the shorter one ending in empty cells.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import io
+import re
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+import numpy as np
+from python_calamine import CalamineSheet, CalamineWorkbook, SheetTypeEnum
+
+from headimpact_service.ingest.guarded.contents import (
+    Content,
+    NamedTable,
+    checked_headings,
+    checked_text,
+    unreadable,
+)
+from headimpact_service.ingest.table import Columns, FloatArray
+from headimpact_service.ingest.zip_guard import GuardedZip
+
+ROWS_AT_ONCE = 16_384
+MAX_SHEETS = 2000
+_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
+
+_MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+_LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006/relationships"
+_SMALLEST = {
+    "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}">'
+    f'<Relationship Id="r1" Type="{_LINKS}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
+    "xl/workbook.xml": f'<workbook xmlns="{_MAIN}" xmlns:r="{_LINKS}"><sheets>'
+    '<sheet name="a" sheetId="1" r:id="r1"/></sheets></workbook>',
+    "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{_PACKAGE}">'
+    f'<Relationship Id="r1" Type="{_LINKS}/worksheet" Target="worksheets/s1.xml"/></Relationships>',
+    "xl/worksheets/s1.xml": f'<worksheet xmlns="{_MAIN}"><sheetData>'
+    '<row r="1"><c r="A1" t="inlineStr"><is><t>a</t></is></c><c r="B1" t="inlineStr"><is><t>b</t></is></c></row>'
+    '<row r="2"><c r="A2"><v>1</v></c><c r="B2"><v>2.5</v></c></row></sheetData></worksheet>',
+}
+"""The parts of a workbook of our own."""
+
+Row = list[Any]
+
+
+def contents(stream: BinaryIO) -> Iterator[Content]:
+    """Every worksheet that has headings with numbers below them."""
+    GuardedZip(stream)
+    stream.seek(0)
+    workbook = CalamineWorkbook.from_filelike(stream)
+    names = [sheet.name for sheet in workbook.sheets_metadata if sheet.typ == SheetTypeEnum.WorkSheet]
+    if len(names) > MAX_SHEETS:
+        raise unreadable(f"A workbook may have at most {MAX_SHEETS} sheets.")
+    found = False
+    for name in names:
+        blocks = _blocks(workbook.get_sheet_by_name(name))
+        if blocks:
+            found = True
+            yield NamedTable(checked_text(name), SheetTable(blocks))
+    if not found:
+        raise unreadable("No sheet of the workbook has headings with numbers below them.")
+
+
+def warm_up() -> None:
+    """Read a workbook of our own, so that every library is loaded."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, part in _SMALLEST.items():
+            archive.writestr(name, part)
+    for content in contents(buffer):
+        if isinstance(content, NamedTable):
+            list(content.table.blocks([0], [1]))
+
+
+@dataclass(slots=True)
+class _Block:
+    """Headings and the rows below them; `columns` are those that have a heading."""
+
+    columns: list[int]
+    headings: list[str]
+    rows: list[Row] = field(default_factory=list)
+
+    def cells(self, place: int) -> list[Any]:
+        """One column, empty where a row is too short for it."""
+        column = self.columns[place]
+        return [row[column] if column < len(row) else "" for row in self.rows]
+
+
+class SheetTable:
+    """The blocks of one sheet, side by side."""
+
+    parted = False
+    units: dict[int, str] = {}  # noqa: RUF012 - a sheet has its units in its headings
+
+    def __init__(self, blocks: list[_Block]) -> None:
+        """Headings of all blocks, in their order."""
+        self.headings = checked_headings(heading for block in blocks for heading in block.headings)
+        self._places = [(block, place) for block in blocks for place in range(len(block.columns))]
+        self._rows = max(len(block.rows) for block in blocks)
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
+        """The asked-for columns."""
+        columns = {place: self._numbers(place) for place in numbers}
+        words = {place: self._texts(place) for place in texts}
+        for first in range(0, self._rows, ROWS_AT_ONCE):
+            rows = slice(first, first + ROWS_AT_ONCE)
+            yield Columns(
+                rows=min(ROWS_AT_ONCE, self._rows - first),
+                numbers={place: values[rows] for place, values in columns.items()},
+                texts={place: cells[rows] for place, cells in words.items()},
+            )
+
+    def _numbers(self, place: int) -> FloatArray:
+        block, column = self._places[place]
+        values = np.full(self._rows, np.nan)
+        values[: len(block.rows)] = [_number(cell) for cell in block.cells(column)]
+        return values
+
+    def _texts(self, place: int) -> list[str]:
+        block, column = self._places[place]
+        return [_text(cell) for cell in block.cells(column)] + [""] * (self._rows - len(block.rows))
+
+
+def _blocks(sheet: CalamineSheet) -> list[_Block]:
+    """Rows below the headings they belong to; rows without a number are words between them."""
+    blocks: list[_Block] = []
+    before: Row = []
+    for row in sheet.iter_rows():
+        if _has_number(row):
+            columns = _named_columns(before)
+            if len(columns) > 1 and sum(_is_number(row[column]) for column in columns) > 1:
+                blocks.append(_Block(columns, [before[column].strip() for column in columns]))
+            if blocks:
+                blocks[-1].rows.append(row)
+        before = row
+    return blocks
+
+
+def _named_columns(row: Row) -> list[int]:
+    """The columns of a row that may be headings: words only."""
+    if _has_number(row):
+        return []
+    return [column for column, cell in enumerate(row) if isinstance(cell, str) and cell.strip()]
+
+
+def _has_number(row: Row) -> bool:
+    return any(map(_is_number, row))
+
+
+def _is_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
+    return isinstance(cell, int | float) and not isinstance(cell, bool)
+
+
+def _number(cell: Any) -> float:  # noqa: ANN401 - any cell
+    if _is_number(cell):
+        return float(cell)
+    return float(cell) if isinstance(cell, str) and _NUMBER.fullmatch(cell) else float("nan")
+
+
+def _text(cell: Any) -> str:  # noqa: ANN401 - any cell
+    if isinstance(cell, dt.date | dt.time):
+        return cell.isoformat()
+    if isinstance(cell, float):
+        return f"{cell:.17g}"
+    return checked_text(str(cell))
