@@ -272,14 +272,14 @@ def _with_derived(
 
 
 def _to_head_axes(name: SignalName, signal: _Uniform, recording: Recording) -> _Uniform:
-    """Rotate sensor axes to head axes, and SAE J211's to the anatomical ones."""
+    """Take SAE J211's axes to the anatomical ones, then rotate sensor axes to head axes."""
     values = signal.values
+    if recording.axes == "sae_j211":
+        values = values * SAE_J211_TO_ANATOMICAL
     if recording.mounting is not None:
         linear = name == "linear_acceleration"
         rotation = recording.mounting.accelerometer_rotation if linear else recording.mounting.gyroscope_rotation
         values = values @ rotation.T
-    if recording.axes == "sae_j211":
-        values = values * SAE_J211_TO_ANATOMICAL
     return signal if values is signal.values else replace(signal, values=values)
 
 
@@ -346,11 +346,10 @@ def _at_head_cg(aligned: dict[str, FloatArray], recording: Recording) -> dict[st
             "Moving the acceleration to the head's centre of gravity needs the angular velocity or acceleration.",
             signal="angular_velocity",
         )
-    sae = recording.axes == "sae_j211"
     moved = transfer_to_head_cg(
         aligned["linear_acceleration"],
         aligned["angular_velocity"],
         aligned["angular_acceleration"],
-        mounting.offset_m * SAE_J211_TO_ANATOMICAL if sae else mounting.offset_m,
+        mounting.offset_m,
     )
     return {**aligned, "linear_acceleration": moved}

@@ -57,10 +57,9 @@ class Mounting:
     Parameters
     ----------
     accelerometer_rotation, gyroscope_rotation
-        Rotation matrices (3 x 3) that take sensor axes to head axes.
+        Rotation matrices (3 x 3) that take sensor axes to anatomical head axes.
     offset_m
-        The accelerometer's position relative to the head's centre of gravity, in the head axes that the rotations
-        lead to [m].
+        The accelerometer's position relative to the head's centre of gravity, in anatomical head axes [m].
     accelerometer_delay_s, gyroscope_delay_s
         How much later than the motion each sensor's samples are stamped [s].
 
@@ -97,7 +96,7 @@ class Recording:
         The signals; at least one is given.
     axes
         The frame the signals are in: ``"anatomical"`` (x forward, y left, z up) or ``"sae_j211"`` (x forward, y right,
-        z down). With a mounting, the frame that its rotations lead to.
+        z down). With a mounting, the convention of the sensor's own axes: they are mapped first, then rotated.
     mounting
         None where the signals already are those of the head's centre of gravity, in head axes.
     constrained_plane

@@ -68,9 +68,7 @@ class ListQuery(Query):
     """What every list takes."""
 
     limit: Annotated[PageSize, Field(description="Rows on a page.")] = 100
-    cursor: Annotated[
-        str | None, Field(min_length=1, max_length=1000, description="`next_cursor` of the page before, unchanged.")
-    ] = None
+    cursor: Annotated[str | None, Field(description="`next_cursor` of the page before, unchanged.")] = None
 
 
 class SyncQuery(ListQuery):

@@ -141,19 +141,21 @@ def test_preparation_moves_a_mounted_sensors_signals_to_the_centre_of_gravity_in
     )
 
 
-def test_the_transfer_is_the_same_whether_a_mounting_is_given_in_anatomical_or_sae_j211_axes():
+def test_a_sensor_in_sae_j211_axes_is_mapped_first_then_rotated_and_its_offset_is_anatomical():
     motion = rigid_body(1000.0, 100, OFFSET_M, inner=4)
     mirror = np.array([1.0, -1.0, -1.0])
-    still = np.eye(3)
+    # sensor to head, about a skew axis (Rodrigues)
+    axis, angle = np.array([2.0, -1.0, 2.0]) / 3.0, 0.7
+    cross = np.cross(np.eye(3), axis)
+    rotation = np.eye(3) - np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
-    def scored(sign: np.ndarray, axes: str) -> np.ndarray:
-        mounting = Mounting(still, still, OFFSET_M * sign)
-        linear = Signal(motion["sensor"] * sign, "m/s^2", 1000.0)
-        return prepare(
-            Recording(linear, Signal(motion["omega"] * sign, "rad/s", 1000.0), axes=axes, mounting=mounting)
-        ).kinematics.linear_acceleration_g
+    def at_head_cg(sign: np.ndarray, axes: str) -> np.ndarray:
+        mounting = Mounting(rotation, rotation, OFFSET_M)
+        linear = Signal((motion["sensor"] @ rotation) * sign, "m/s^2", 1000.0)
+        angular = Signal((motion["omega"] @ rotation) * sign, "rad/s", 1000.0)
+        return prepare(Recording(linear, angular, axes=axes, mounting=mounting)).kinematics.linear_acceleration_g
 
-    np.testing.assert_allclose(scored(mirror, "sae_j211"), scored(np.ones(3), "anatomical"), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(at_head_cg(mirror, "sae_j211"), at_head_cg(np.ones(3), "anatomical"), rtol=0, atol=1e-12)
 
 
 def test_sae_j211_axes_become_anatomical_ones_by_x_minus_y_minus_z():

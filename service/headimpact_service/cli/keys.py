@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, cast
 
-from rich.console import Console
-from rich.table import Table
-
 from headimpact_service.cli.database import migrated
 from headimpact_service.deps import SCOPES
 from headimpact_service.store import ids, keys, organisations
@@ -37,18 +34,16 @@ def _scopes(given: Sequence[str]) -> tuple[str, ...]:
 
 
 def show(organisation: str, *, database_url: str | None) -> None:
-    """Print an organisation's keys as a table."""
+    """Print an organisation's keys; ids are never shortened, since `keys revoke` takes them whole."""
     with migrated(database_url) as database:
         organisation_id = _organisation(database, organisation)
         with database.read() as conn:
             found = keys.list_keys(conn, organisation_id)
-    table = Table("Key", "Begins", "Name", "Mode", "Scopes", "Made", "Revoked")
     for key in found:
         scopes = EVERY if key.scopes == set(SCOPES) else " ".join(sorted(key.scopes))
-        revoked = "" if key.revoked_at is None else f"{key.revoked_at:%Y-%m-%d %H:%M}"
-        made = f"{key.created_at:%Y-%m-%d %H:%M}"
-        table.add_row(ids.encode("key", key.id), key.shown, key.name, key.mode, scopes, made, revoked)
-    Console().print(table)
+        state = "valid" if key.revoked_at is None else f"revoked {key.revoked_at:%Y-%m-%d %H:%M}"
+        print(f"{ids.encode('key', key.id)}  {key.shown}…  {key.mode}  {state}  {key.name}")
+        print(f"    made {key.created_at:%Y-%m-%d %H:%M}, scopes: {scopes}")
 
 
 def revoke(organisation: str, key_id: str, *, database_url: str | None) -> None:

@@ -150,11 +150,12 @@ class AccelerometerMounting(Strict):
     """How the accelerometer sits on the head."""
 
     rotation: Matrix = Field(
-        description="Sensor axes to head axes: orthonormal with determinant +1 within 1e-3.",
+        description="Sensor axes to anatomical head axes: orthonormal with determinant +1 within 1e-3.",
         examples=[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]],
     )
     offset_mm: Vector = Field(
-        description="Its position from the head's centre of gravity, in head axes [mm].", examples=[[70.0, 0.0, -60.0]]
+        description="Its position from the head's centre of gravity, in anatomical head axes [mm].",
+        examples=[[70.0, 0.0, -60.0]],
     )
     delay_ms: Delay = 0.0
 
@@ -163,7 +164,7 @@ class GyroscopeMounting(Strict):
     """How the gyroscope sits on the head; where it sits makes no difference."""
 
     rotation: Matrix = Field(
-        description="Sensor axes to head axes: orthonormal with determinant +1 within 1e-3.",
+        description="Sensor axes to anatomical head axes: orthonormal with determinant +1 within 1e-3.",
         examples=[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]],
     )
     delay_ms: Delay = 0.0
@@ -221,7 +222,8 @@ class Kinematics(Strict):
 
     axes: Axes = Field(
         "anatomical",
-        description="`anatomical`: x forward, y left, z up. `sae_j211`: x forward, y right, z down.",
+        description="`anatomical`: x forward, y left, z up. `sae_j211`: x forward, y right, z down: every signal is "
+        "taken to (x, -y, -z) first, before a mounting's rotations.",
     )
     location: Location = Field("head_cg", description="`sensor` needs a mounting, inline or of the device.")
     mounting: MountingBody | None = None
@@ -244,7 +246,7 @@ class OperatingPointBody(Strict):
     criterion: CriterionKey = Field(examples=["bam"])
     sensitivity: Fraction | None = Field(None, description="Share of concussions to be found.", examples=[0.9])
     specificity: Fraction | None = Field(None, description="Share of other impacts to be passed.")
-    threshold: Fraction | None = Field(None, description="A probability.")
+    threshold: Fraction | None = Field(None, description="A probability, taken as it is at any incidence.")
 
 
 class ScoreBody(Strict):

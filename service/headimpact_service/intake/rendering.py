@@ -11,7 +11,7 @@ from headimpact.filtering import AppliedFilter
 from headimpact.kinematics import HeadKinematics
 from headimpact.quality import QualityNote
 from headimpact.recording import AXES
-from headimpact.risk import OperatingPoint
+from headimpact.risk import OperatingPoint, resolve_operating_point
 from headimpact.scoring import CriterionScore, ImpactScore
 from headimpact_service import __version__
 from headimpact_service.intake.records import axes_lists
@@ -94,7 +94,10 @@ def note_document(note: QualityNote) -> dict[str, Any]:
 
 
 def _operating_point(point: OperatingPoint, score: ImpactScore | None) -> dict[str, Any]:
-    probability = None if score is None else score.criteria[point.request.criterion].probability
+    return _point(point, None if score is None else score.criteria[point.request.criterion].probability)
+
+
+def _point(point: OperatingPoint, probability: float | None) -> dict[str, Any]:
     return {
         "criterion": point.request.criterion,
         "requested": point.request.requested,
@@ -105,6 +108,18 @@ def _operating_point(point: OperatingPoint, score: ImpactScore | None) -> dict[s
         "specificity": point.specificity,
         "basis": point.basis,
     }
+
+
+def as_asked(document: dict[str, Any], stored: NewScore, scored: Scored) -> None:
+    """Answer a redelivery's own operating points and extra criteria, on the probabilities that are stored."""
+    requests = scored.record.operating_points
+    if requests and stored.state == "scored":
+        points = [resolve_operating_point(request, scored.terms.model, stored.incidence) for request in requests]
+        document["operating_points"] = [
+            _point(point, stored.probabilities[point.request.criterion]) for point in points
+        ]
+    if scored.score is not None and scored.score.extra_criteria:
+        document["extra_criteria"] = {key: _extra(found) for key, found in scored.score.extra_criteria.items()}
 
 
 def _extra(found: CriterionScore) -> dict[str, Any]:

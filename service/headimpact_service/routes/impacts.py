@@ -2,27 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import partial
+from typing import Annotated, Literal
 
 from pydantic import Field
 from starlette.responses import Response
 
 from headimpact_service import deps, examples
-from headimpact_service.answers import answer, json_bytes, no_content
+from headimpact_service.answers import JSON, answer, json_bytes, no_content
 from headimpact_service.errors import invalid_parameter, not_found
 from headimpact_service.ingest.digest import content_digest
 from headimpact_service.ingest.impact_json import CriterionKey, ImpactBody
 from headimpact_service.ingest.impact_reading import to_record
 from headimpact_service.ingest.record import ImpactRecord
-from headimpact_service.intake.rendering import scored_traces
+from headimpact_service.intake.exporting import CONTEXT_FLAGS
+from headimpact_service.intake.rendering import as_asked, scored_traces
 from headimpact_service.intake.scoring import Scored, digest_bytes
 from headimpact_service.intake.storing import new_impact
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import Instant, Probability, SyncQuery
-from headimpact_service.routes.impact_shapes import COLUMNS, ImpactList, ImpactView, impact_cells, impact_document
+from headimpact_service.routes.impact_shapes import (
+    COLUMNS,
+    NUMBERS,
+    ImpactList,
+    ImpactView,
+    impact_cells,
+    impact_document,
+)
 from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
 from headimpact_service.routes.scoring import RECORD_PROBLEMS, score
+from headimpact_service.routes.trace_export import trace_form, with_samples
 from headimpact_service.store import impacts
 from headimpact_service.store.impacts import Impact, ImpactFilters, NewImpact
 
@@ -44,15 +54,16 @@ Text = Annotated[str | None, Field(min_length=1, max_length=200)]
     },
     body=ImpactBody,
     example=examples.impact(),
-    problems=(*RECORD_PROBLEMS, "external-id-conflict", "impact-deleted"),
+    problems=(*RECORD_PROBLEMS, "not-found", "external-id-conflict", "impact-deleted"),
 )
 async def create_impact(call: Call) -> Response:
     """Committed before the answer. With an `external_id` it is safe to send again: 200 for the same content."""
     record = to_record(call.body)
     scored, new = await _scored(call, record)
     outcome = await deps.write(call.request, lambda conn: impacts.add(conn, call.data_set_id, new))
-    created = outcome.status == "created"
-    return _answer(outcome.impact, 201 if created else 200, scored if created else None)
+    if outcome.status == "created":
+        return _answer(outcome.impact, 201, scored)
+    return _answer(outcome.impact, 200, scored, redelivered=True)
 
 
 async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
@@ -62,8 +73,10 @@ async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
     return scored, new_impact(scored, sent, call.key.id)
 
 
-def _answer(impact: Impact, status: int, scored: Scored | None) -> Response:
+def _answer(impact: Impact, status: int, scored: Scored | None, *, redelivered: bool = False) -> Response:
     document = impact_document(impact)
+    if redelivered and scored is not None and impact.score is not None:
+        as_asked(document["score"], impact.score, scored)
     if scored is not None and "traces" in scored.record.include:
         document["score"]["traces"] = scored_traces(scored)
     headers = {**etag(impact.revision), "Location": f"/v1/impacts/{document['id']}"}
@@ -84,6 +97,10 @@ class ImpactQuery(SyncQuery):
     min_probability: Annotated[
         Probability | None, Field(description="Where `criterion` gives at least this probability.")
     ] = None
+    include: Annotated[
+        Literal["traces"] | None,
+        Field(description="In a table: impacts with their samples, to be imported elsewhere; no scores."),
+    ] = None
 
 
 @routes(
@@ -96,9 +113,15 @@ class ImpactQuery(SyncQuery):
     problems=("bad-cursor",),
 )
 async def list_impacts(call: Call) -> Response:
-    """With `updated_since` in the order of change, deleted impacts as tombstones."""
+    """With `updated_since` in the order of change, deleted impacts as tombstones.
+
+    With `include=traces`, NDJSON holds an impact a line as `POST /v1/imports` takes it, CSV and Parquet a sample a row.
+    """
     query: ImpactQuery = call.query
     filters = _filters(query)
+    traces = query.include is not None
+    if traces and call.media_type == JSON:
+        raise invalid_parameter("include", "Traces are listed as NDJSON, CSV or Parquet: name one in Accept.", "accept")
     listing = Listing(
         "impacts",
         lambda conn, after, limit: impacts.page(
@@ -107,6 +130,10 @@ async def list_impacts(call: Call) -> Response:
         impact_document,
         COLUMNS,
         impact_cells,
+        numbers=NUMBERS,
+        flags=CONTEXT_FLAGS,
+        form=trace_form if traces else None,
+        parts=partial(with_samples, call) if traces else None,
     )
     return await answer_list(call, listing, query)
 

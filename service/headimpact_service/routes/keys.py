@@ -10,11 +10,14 @@ from starlette.responses import Response
 
 from headimpact_service import deps
 from headimpact_service.answers import answer, no_content
+from headimpact_service.errors import Problem, not_found
 from headimpact_service.ingest.impact_json import Name, Strict
 from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
 from headimpact_service.store import ids, keys
 
 routes = Routes("keys")
+
+LIVE = "live"
 
 Scope = Literal[deps.SCOPES]  # type: ignore[valid-type] # the one list of them
 Mode = Literal["live", "test"]
@@ -59,7 +62,9 @@ class NewKeyBody(Strict):
 
     name: Name = Field("key", description="What it is for.")
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=len(deps.SCOPES))]
-    mode: Mode = Field("live", description="A test key sees a separate sandbox data set.")
+    mode: Mode | None = Field(
+        None, description="A test key sees a separate sandbox data set. The caller's own mode unless given."
+    )
 
 
 @routes("GET", "/v1/me", "Whom this key speaks for", ANY_KEY, {200: Answer(CallerView, "The key's owner.")})
@@ -70,9 +75,10 @@ async def read_me(call: Call) -> Response:
 
 @routes("GET", "/v1/keys", "The organisation's keys", "admin", {200: Answer(KeyListView, "All keys, on one page.")})
 async def list_keys(call: Call) -> Response:
-    """Revoked keys stay listed; secrets are never shown again."""
+    """Revoked keys stay listed; secrets are never shown again. A test key sees test keys only."""
     found = await deps.read(call.request, lambda conn: keys.list_keys(conn, call.key.organisation_id))
-    return answer({"data": [document(key) for key in found], "next_cursor": None})
+    shown = [document(key) for key in found if _within_reach(call, key)]
+    return answer({"data": shown, "next_cursor": None})
 
 
 @routes(
@@ -85,11 +91,13 @@ async def list_keys(call: Call) -> Response:
     example={"name": "sideline gate", "scopes": ["score", "impacts:write"]},
 )
 async def create_key(call: Call) -> Response:
-    """The key belongs to the caller's organisation."""
+    """The key belongs to the caller's organisation. A test key makes test keys only."""
     body: NewKeyBody = call.body
+    mode = body.mode or call.key.mode
+    if mode == LIVE and call.key.mode != LIVE:
+        raise Problem("insufficient-scope", "A test key cannot make a live key.")
     key, plaintext = await deps.write(
-        call.request,
-        lambda conn: keys.create_key(conn, call.key.organisation_name, body.scopes, body.mode, body.name),
+        call.request, lambda conn: keys.create_key(conn, call.key.organisation_name, body.scopes, mode, body.name)
     )
     return answer(document(key) | {"key": plaintext}, 201)
 
@@ -103,11 +111,26 @@ async def create_key(call: Call) -> Response:
     problems=("not-found",),
 )
 async def revoke_key(call: Call) -> Response:
-    """From now on requests with it are refused, in other processes of this service within five seconds."""
+    """From now on requests with it are refused, in other processes of this service within five seconds.
+
+    To a test key, live keys do not exist.
+    """
     key_id = deps.identifier("key", call.path("key_id"), "key")
-    await deps.write(call.request, lambda conn: keys.revoke_key(conn, call.key.organisation_id, key_id))
+
+    def revoke(conn: Any) -> None:  # noqa: ANN401 - a connection of the store
+        key = keys.get_key(conn, call.key.organisation_id, key_id)
+        if key is None or not _within_reach(call, key):
+            raise not_found("key")
+        keys.revoke_key(conn, call.key.organisation_id, key_id)
+
+    await deps.write(call.request, revoke)
     call.request.app.state.gate.forget()
     return no_content()
+
+
+def _within_reach(call: Call, key: keys.KeyRow) -> bool:
+    """A live key administers all keys of its organisation, a test key the test keys."""
+    return call.key.mode in {LIVE, key.mode}
 
 
 def document(key: keys.KeyRow) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from starlette.responses import Response
 from headimpact.risk import DEFAULT_OPERATING_POINTS, LAKSARI_2020
 from headimpact_service import deps
 from headimpact_service.answers import answer
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.impact_json import MAX_OPERATING_POINTS, Fraction, OperatingPointBody, Strict
 from headimpact_service.intake.scoring import Terms, operating_points
 from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
@@ -69,7 +70,12 @@ async def read_settings(call: Call) -> Response:
     problems=("precondition-failed", "operating-point-unreachable"),
 )
 async def change_settings(call: Call) -> Response:
-    """New scores follow at once, in other processes within five seconds; stored scores stay as they are."""
+    """New scores follow at once, in other processes within five seconds; stored scores stay as they are.
+
+    Live and test keys share them, so only a live key may change them.
+    """
+    if call.key.mode != "live":
+        raise Problem("insufficient-scope", "A test key cannot change the settings of live data.")
     revision = if_match(call.request)
     body: SettingsBody = call.body
     named = body.model_fields_set

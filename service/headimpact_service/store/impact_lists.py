@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -66,6 +67,12 @@ _TRACE = (
 )
 _PRESENT_TRACE = _TRACE.where(impact_revisions.c.revision == impacts.c.revision)
 _KEPT_TRACE = _TRACE.where(impact_revisions.c.revision == bindparam("revision"))
+_TRACED = (
+    select(impacts.c.id, impact_revisions.c.document, impact_revisions.c.trace)
+    .join(impacts, OF_REVISION)
+    .where(impacts.c.data_set_id == _DATA_SET, impact_revisions.c.revision == impacts.c.revision)
+    .where(impacts.c.id.in_(bindparam("impact_ids", expanding=True)))
+)
 _SAME_CONTENT = (
     select(impacts.c.id)
     .where(impacts.c.data_set_id == _DATA_SET, impacts.c.input_digest == bindparam("input_digest"))
@@ -155,6 +162,12 @@ def trace(conn: Connection, data_set_id: bytes, impact_id: bytes, revision: int 
     parameters = {"data_set_id": data_set_id, "impact_id": impact_id}
     row = conn.execute(query, parameters | ({} if revision is None else {"revision": revision})).first()
     return None if row is None else Trace(*row)
+
+
+def traced(conn: Connection, data_set_id: bytes, impact_ids: Sequence[bytes]) -> dict[bytes, tuple[Any, bytes]]:
+    """The present document and samples of impacts, by id; none of a deleted one."""
+    rows = conn.execute(_TRACED, {"data_set_id": data_set_id, "impact_ids": list(impact_ids)})
+    return {impact_id: (document, trace) for impact_id, document, trace in rows}
 
 
 def find_same_content(conn: Connection, data_set_id: bytes, input_digest: bytes, exclude: bytes = b"") -> bytes | None:

@@ -24,6 +24,7 @@ from headimpact_service.store.impact_lists import (
     page,
     revisions,
     trace,
+    traced,
 )
 from headimpact_service.store.impact_rows import Impact, NewImpact, Outcome, Revision, external_id_digest
 from headimpact_service.store.prepared import Prepared
@@ -48,6 +49,7 @@ __all__ = [
     "page",
     "revisions",
     "trace",
+    "traced",
 ]
 
 _DATA_SET: BindParameter[bytes] = bindparam("data_set_id")
@@ -111,16 +113,16 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
 
     A redelivery of an external id with the content of any kept revision is `unchanged`; with other content it is an
     `external-id-conflict` problem, and `impact-deleted` after a deletion. An athlete id that is none of the data set's
-    is an `invalid-payload` problem. With `same_event_is_unchanged` (imports), an impact of the same athlete, instant
-    and input is `unchanged` too, whatever it is called.
+    is a `not-found` problem. With `same_event_is_unchanged` (imports), an impact of the same athlete, instant and input
+    is `unchanged` too, under whatever name that is not taken.
     """
     known = _look_up(conn, data_set_id, new)
+    if known.same_external_id is not None:
+        return _redelivery(conn, data_set_id, new, known.same_external_id)
     if same_event_is_unchanged and known.same_content is not None:
         same = _same_event(conn, data_set_id, new, known)
         if same is not None:
             return Outcome("unchanged", same)
-    if known.same_external_id is not None:
-        return _redelivery(conn, data_set_id, new, known.same_external_id)
     return Outcome("created", _insert(conn, data_set_id, new, known))
 
 
@@ -136,9 +138,7 @@ def _look_up(conn: Connection, data_set_id: bytes, new: NewImpact) -> _Known:
     known = _Known(*(_KNOWN.first(conn, parameters) or ()))
     if new.athlete_id is not None and known.athlete_by_id is None:
         detail = "There is no athlete with this id."
-        raise Problem(
-            "invalid-payload", detail, errors=[PayloadError(detail, "unknown-athlete", pointer="/athlete/id")]
-        )
+        raise Problem("not-found", detail, errors=[PayloadError(detail, "unknown-athlete", pointer="/athlete/id")])
     return known
 
 

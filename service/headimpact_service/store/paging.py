@@ -34,7 +34,7 @@ Row = TypeVar("Row")
 Kept = TypeVar("Kept", bound=Positioned)
 Columns = TypeVar("Columns", bound=tuple[Any, ...])
 
-_FORM = struct.Struct(f">4sq{LENGTH}s")
+_FORM = struct.Struct(f">4sq{LENGTH}s4s")
 _LATEST = (datetime.max.replace(tzinfo=EPOCH.tzinfo) - EPOCH) // MICROSECOND
 
 
@@ -57,7 +57,8 @@ class Page(Generic[Row]):
 def encode_cursor(position: Position, of: str) -> str:
     """An opaque cursor for the list and filters that `of` names."""
     microseconds = (position.updated_at - EPOCH) // MICROSECOND
-    packed = _FORM.pack(_mark(of), microseconds, position.id)
+    mark = _mark(of)
+    packed = _FORM.pack(mark, microseconds, position.id, _check(mark, microseconds, position.id))
     return urlsafe_b64encode(packed).rstrip(b"=").decode()
 
 
@@ -65,12 +66,17 @@ def decode_cursor(cursor: str, of: str) -> Position:
     """The position in a cursor; a `bad-cursor` problem if it was not made by :func:`encode_cursor` for `of`."""
     try:
         raw = cursor.encode("ascii")
-        mark, microseconds, identifier = _FORM.unpack(urlsafe_b64decode(raw + b"=" * (-len(raw) % 4)))
+        mark, microseconds, identifier, check = _FORM.unpack(urlsafe_b64decode(raw + b"=" * (-len(raw) % 4)))
     except (UnicodeEncodeError, binascii.Error, struct.error):
         raise _bad_cursor() from None
-    if mark != _mark(of) or not 0 <= microseconds <= _LATEST:
+    if mark != _mark(of) or not 0 <= microseconds <= _LATEST or check != _check(mark, microseconds, identifier):
         raise _bad_cursor()
     return Position(EPOCH + timedelta(microseconds=microseconds), identifier)
+
+
+def _check(mark: bytes, microseconds: int, identifier: bytes) -> bytes:
+    """Tells a cursor that was altered or cut on its way; it is no secret."""
+    return blake2b(mark + microseconds.to_bytes(8, "big") + identifier, digest_size=4).digest()
 
 
 def _mark(of: str) -> bytes:

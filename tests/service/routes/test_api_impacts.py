@@ -85,12 +85,22 @@ class TestSend:
         codes = {note["code"] for note in api.create(context={"worn": False})["score"]["quality"]}
         assert "not_worn" in codes
 
-    def test_an_unknown_athlete_id_is_422_and_stores_nothing(self, api: Api) -> None:
+    def test_an_unknown_athlete_id_is_404_and_stores_nothing(self, api: Api) -> None:
         for athlete_id in ("ath_00000000000000000000000000", "nobody"):
             answer = api.post("/v1/impacts", json=impact_body(athlete={"id": athlete_id}))
-            assert answer.status_code == 422
+            assert answer.status_code == 404
             assert answer.json()["errors"][0]["pointer"] == "/athlete/id"
         assert api.get("/v1/impacts").json()["data"] == []
+
+    def test_a_redelivery_answers_what_it_asks_for(self, api: Api) -> None:
+        first = api.create("e-9")
+        asked = {"operating_points": [{"criterion": "bric", "threshold": 0.3}], "extra_criteria": ["damage"]}
+        again = api.post("/v1/impacts", json=impact_body("e-9", **asked))
+        assert again.status_code == 200
+        score = again.json()["score"]
+        assert [point["requested"] for point in score["operating_points"]] == [{"threshold": 0.3}]
+        assert list(score["extra_criteria"]) == ["damage"]
+        assert score["criteria"] == first["score"]["criteria"]
 
     def test_a_local_time_is_placed_by_its_zone(self, api: Api) -> None:
         impact = api.create(occurred_at="2026-07-01T12:00:00", time_zone="Europe/Dublin")

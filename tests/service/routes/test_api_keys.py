@@ -52,6 +52,19 @@ class TestKeys:
         assert key not in listed.text
         assert [row["name"] for row in listed.json()["data"]] == ["gate 7", "key"]
 
+    def test_a_test_key_reaches_neither_live_keys_nor_the_settings(
+        self, api: Api, make_key: Callable[..., str]
+    ) -> None:
+        live = api.post("/v1/keys", json={"scopes": ["score"]}).json()
+        test = make_key(*SCOPES, mode="test")
+        made = api.post("/v1/keys", key=test, json={"scopes": ["score"]})
+        assert (made.status_code, made.json()["mode"]) == (201, "test")
+        assert api.post("/v1/keys", key=test, json={"scopes": ["score"], "mode": "live"}).status_code == 403
+        assert api.delete(f"/v1/keys/{live['id']}", key=test).status_code == 404
+        assert {row["mode"] for row in api.get("/v1/keys", key=test).json()["data"]} == {"test"}
+        assert api.send("PATCH", "/v1/settings", key=test, json={"incidence": 0.3}).status_code == 403
+        assert api.get("/v1/me", key=live["key"]).status_code == 200
+
     def test_a_revoked_key_is_refused_at_once(self, api: Api) -> None:
         made = api.post("/v1/keys", json={"scopes": ["score"]}).json()
         assert api.get("/v1/me", key=made["key"]).status_code == 200

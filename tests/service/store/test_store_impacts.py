@@ -96,7 +96,7 @@ class TestAdd:
         for athlete_id in (ids.new(), theirs.id):
             with pytest.raises(Problem) as caught:
                 add(database, data_set, make_impact(athlete_id=athlete_id, athlete_external_id=None))
-            assert caught.value.slug == "invalid-payload"
+            assert caught.value.slug == "not-found"
             assert caught.value.errors[0].pointer == "/athlete/id"
         assert listed(database, data_set) == []
 
@@ -129,6 +129,13 @@ class TestAdd:
         add(database, data_set, make_impact(external_id="1"))
         new = make_impact(external_id="2", **change)
         assert add(database, data_set, new, same_event_is_unchanged=True).status == "created"
+
+    def test_an_import_under_a_taken_name_is_not_another_event(self, database, data_set, make_impact) -> None:
+        add(database, data_set, make_impact("a", external_id="1"))
+        add(database, data_set, make_impact("b", external_id="2"))
+        with pytest.raises(Problem) as caught:
+            add(database, data_set, make_impact("b", external_id="1"), same_event_is_unchanged=True)
+        assert caught.value.slug == "external-id-conflict"
 
     def test_a_nameless_import_is_found_by_its_content(self, database, data_set, make_impact) -> None:
         new = make_impact(external_id=None, athlete_external_id=None, occurred_at=None)

@@ -29,6 +29,14 @@ def test_a_cursor_of_another_list_is_refused() -> None:
     assert caught.value.slug == "bad-cursor"
 
 
+def test_an_altered_cursor_is_refused() -> None:
+    cursor = encode_cursor(POSITION, "impacts")
+    swapped = "B" if cursor[20] == "A" else "A"
+    with pytest.raises(Problem) as caught:
+        decode_cursor(cursor[:20] + swapped + cursor[21:], "impacts")
+    assert caught.value.slug == "bad-cursor"
+
+
 @given(st.text())
 def test_what_is_no_cursor_is_a_problem(text: str) -> None:
     with pytest.raises(Problem) as caught:
