@@ -1,4 +1,4 @@
-"""`headimpact`: serve, migrate, make keys, score a file, write the API's description."""
+"""`headimpact`: serve, migrate, make keys, score a file, import files, write the API's description."""
 
 from __future__ import annotations
 
@@ -112,6 +112,46 @@ def score(
     }
     given = {name: value for name, value in fields.items() if value is not None}
     raise typer.Exit(command.run(file, given, as_json=as_json))
+
+
+@app.command("import")
+def import_files(
+    paths: Annotated[list[Path], typer.Argument(help="Files or folders; a folder of one crash test is one set.")],
+    organisation: Organisation = "default",
+    mode: Annotated[Mode, typer.Option(help="The data set that the impacts go into.")] = Mode.LIVE,
+    preset: Annotated[str | None, typer.Option(help="A device's layout, as GET /v1/presets lists them.")] = None,
+    mapping: Annotated[str | None, typer.Option(help="JSON, or @ and a file of it: which column is what.")] = None,
+    athlete: Annotated[str | None, typer.Option(help="Your id of the athlete.")] = None,
+    device: Annotated[str | None, typer.Option(help="Serial number of the device.")] = None,
+    occurred_at: Annotated[str | None, typer.Option(help="RFC 3339, or a local time with --time-zone.")] = None,
+    time_zone: Annotated[str | None, typer.Option(help="IANA zone of local times.")] = None,
+    sample_rate_hz: Annotated[str | None, typer.Option(help="Samples per second.")] = None,
+    axes: Annotated[str | None, typer.Option(help="anatomical or sae_j211.")] = None,
+    low_pass: Annotated[str | None, typer.Option("--filter", help="paper, none, or JSON.")] = None,
+    fill_gaps: Annotated[str | None, typer.Option(help="true fills gaps of at most 2 samples.")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be read; store nothing.")] = False,
+    database_url: DatabaseUrl = None,
+) -> None:
+    """Import files into the database, as POST /v1/imports does; what is there already is unchanged."""
+    from headimpact_service.cli import importing as command
+
+    fields = {
+        "preset": preset,
+        "mapping": mapping,
+        "athlete": athlete,
+        "device": device,
+        "occurred_at": occurred_at,
+        "time_zone": time_zone,
+        "sample_rate_hz": sample_rate_hz,
+        "axes": axes,
+        "filter": low_pass,
+        "fill_gaps": fill_gaps,
+    }
+    given = {name: value for name, value in fields.items() if value is not None}
+    code = command.run(
+        paths, given, organisation=organisation, mode=mode.value, dry_run=dry_run, database_url=database_url
+    )
+    raise typer.Exit(code)
 
 
 @app.command()

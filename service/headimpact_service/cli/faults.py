@@ -27,8 +27,9 @@ def explain(error: Exception) -> tuple[str, int]:
 
 def problem_line(problem: Problem) -> str:
     """A problem with the places of its errors."""
-    places = "; ".join(f"{error.pointer or error.parameter or 'body'}: {error.detail}" for error in problem.errors)
-    return f"{problem.detail} {places}".strip() if places and places not in problem.detail else problem.detail
+    news = [error for error in problem.errors if error.detail not in problem.detail]
+    places = "; ".join(f"{error.pointer or error.parameter or 'body'}: {error.detail}" for error in news)
+    return f"{problem.detail} {places}".strip()
 
 
 def _setting_line(error: ValidationError) -> str:

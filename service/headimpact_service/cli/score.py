@@ -20,7 +20,7 @@ from headimpact_service.intake.scoring import Scored, Terms, score_records
 
 def run(file: Path, fields: Mapping[str, str], *, as_json: bool) -> int:
     """Score and print; the exit code says whether every impact could be scored."""
-    options = ImportOptions.from_fields(_with_mapping(fields), filename=file.name)
+    options = ImportOptions.from_fields(with_mapping(fields), filename=file.name)
     outcomes = _score(_bytes(file), options)
     for index, outcome in enumerate(outcomes):
         if isinstance(outcome, Problem):
@@ -38,7 +38,7 @@ def _bytes(file: Path) -> bytes:
     return sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
 
 
-def _with_mapping(fields: Mapping[str, str]) -> dict[str, str]:
+def with_mapping(fields: Mapping[str, str]) -> dict[str, str]:
     """The fields, with a mapping that was given as `@file` in place of its name."""
     given = dict(fields)
     if given.get("mapping", "").startswith("@"):

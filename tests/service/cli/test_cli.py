@@ -193,3 +193,48 @@ class TestOthers:
 
         monkeypatch.setattr("headimpact_service.cli.database.migrate", fail)
         assert run("migrate") == (1, "", "headimpact: RuntimeError: broken\n")
+
+
+class TestImport:
+    def test_a_file_is_imported_once_and_each_has_its_line(self, run: Run, tmp_path: Path) -> None:
+        file = tmp_path / "impacts.ndjson"
+        bad = impact_body("bad")
+        del bad["kinematics"]["linear_acceleration"]["unit"]
+        file.write_text("\n".join(json.dumps(body) for body in (impact_body("e-0"), bad, impact_body("e-2", scale=0.5))))
+        database = f"sqlite:///{tmp_path / 'x.db'}"
+        code, printed, _ = run("import", str(file), "--database-url", database)
+        assert code == 2
+        assert f"{file}: 2 created, 1 failed" in printed
+        assert "    bad: " in printed
+        code, printed, _ = run("import", str(file), "--database-url", database)
+        assert f"{file}: 0 created, 2 unchanged, 1 failed" in printed
+
+    def test_a_folder_is_imported_file_by_file_and_a_broken_one_says_why(self, run: Run, tmp_path: Path) -> None:
+        folder = tmp_path / "files"
+        folder.mkdir()
+        (folder / "a.json").write_text(json.dumps(impact_body("a")))
+        (folder / "b.csv").write_text("no,columns\n1,2\n")
+        (folder / ".hidden").write_text("nothing")
+        code, printed, _ = run("import", str(folder), "--database-url", f"sqlite:///{tmp_path / 'x.db'}")
+        assert code == 2
+        assert [line.split(": ")[1] for line in printed.splitlines()] == ["1 created", "refused"]
+
+    def test_a_dry_run_stores_nothing(self, run: Run, tmp_path: Path) -> None:
+        file = tmp_path / "a.json"
+        file.write_text(json.dumps(impact_body("a")))
+        database = f"sqlite:///{tmp_path / 'x.db'}"
+        assert run("import", str(file), "--dry-run", "--database-url", database)[1].strip() == f"{file}: 1 readable"
+        assert "1 created" in run("import", str(file), "--database-url", database)[1]
+
+    def test_a_path_that_is_not_there_is_one_line(self, run: Run, tmp_path: Path) -> None:
+        code, _, failed = run("import", str(tmp_path / "none"), "--database-url", f"sqlite:///{tmp_path / 'x.db'}")
+        assert (code, failed) == (2, f"headimpact: There is no file {tmp_path / 'none'}.\n")
+
+    def test_a_folder_of_a_crash_test_is_one_set(self, run: Run, tmp_path: Path) -> None:
+        folder = tmp_path / "v1"
+        folder.mkdir()
+        (folder / "v1.EV5").write_text("----- INSTRUMENTATION -----\n----- END -----\n")
+        (folder / "v1.001").write_text("0\t1\n")
+        _, printed, _ = run("import", str(folder), "--database-url", f"sqlite:///{tmp_path / 'x.db'}")
+        assert printed.startswith(f"{folder}: refused")
+        assert printed.count("refused") == 1

@@ -1,0 +1,169 @@
+"""`headimpact import PATH…`: files and folders into the database, with a progress bar and a line per file."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
+from headimpact_service.cli.database import migrated
+from headimpact_service.cli.faults import USAGE, problem_line
+from headimpact_service.cli.score import with_mapping
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.upload import read_upload
+from headimpact_service.intake.importing import COUNTED, look_up, make_ready, preview_row, score_found, store, summary
+from headimpact_service.intake.scoring import Terms
+from headimpact_service.store import organisation_settings, organisations
+from headimpact_service.store.database import Database
+
+CHUNK = 500
+"""Impacts that are committed together."""
+SHOWN = 5
+"""Refused impacts of a file that are told one by one."""
+SET_MARKS = ("*.ev5", "*.mme")
+"""What makes a folder one set of channels: a laboratory's file that describes the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where impacts go, and what they are scored with."""
+
+    data_set_id: bytes
+    terms: Terms
+
+
+def run(
+    paths: Sequence[Path],
+    fields: Mapping[str, str],
+    *,
+    organisation: str,
+    mode: str,
+    dry_run: bool,
+    database_url: str | None,
+) -> int:
+    """Import every file; the exit code is 2 if any impact of any file was refused."""
+    given = with_mapping(fields)
+    ImportOptions.from_fields(given)  # a field that is wrong is wrong for every file: say so before the first
+    files = [file for path in paths for file in _files(path)]
+    if not files:
+        raise ValueError("There is no file to import in these paths.")
+    console = Console(highlight=False, soft_wrap=True)
+    failed = 0
+    with migrated(database_url) as database, _progress(console) as progress:
+        target = _target(database, organisation, mode)
+        task = progress.add_task("", total=None)
+        for label, content in files:
+            options = ImportOptions.from_fields(given, filename=label.name)
+
+            def advance(total: int, done: int, name: str = label.name) -> None:
+                progress.update(task, description=name, total=total, completed=done)
+
+            failed += _import(database, target, (label, content), options, console, advance, dry_run=dry_run)
+    return USAGE if failed else 0
+
+
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
+def _files(path: Path) -> Iterator[tuple[Path, bytes | Path]]:
+    """A file; a folder of one laboratory set as the zip it would be sent as; any other folder file by file."""
+    if not path.is_dir():
+        if not path.exists():
+            raise ValueError(f"There is no file {path}.")
+        yield path, path
+    elif _is_set(path):
+        yield path, _zipped(path)
+    else:
+        for inside in sorted(path.iterdir()):
+            if not inside.name.startswith("."):
+                yield from _files(inside)
+
+
+def _is_set(folder: Path) -> bool:
+    return any(file.match(mark) or file.match(mark.upper()) for file in folder.iterdir() for mark in SET_MARKS)
+
+
+def _zipped(folder: Path) -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w") as archive:
+        for file in sorted(folder.rglob("*")):
+            if file.is_file() and not file.is_symlink():
+                archive.write(file, file.relative_to(folder))
+    return held.getvalue()
+
+
+def _target(database: Database, organisation: str, mode: str) -> Target:
+    def find(conn: Any) -> Target:  # noqa: ANN401 - a connection of the store
+        found = organisations.ensure(conn, organisation)
+        settings = organisation_settings.get(conn, found.id)
+        points = tuple(OperatingPointRequest(**point) for point in settings.operating_points)  # type: ignore[arg-type]
+        terms = Terms(incidence=settings.incidence, operating_points=points or DEFAULT_OPERATING_POINTS)
+        data_set = organisations.ensure_data_set(conn, found.id, cast("Literal['live', 'test']", mode))
+        return Target(data_set, terms)
+
+    return database.write(find)
+
+
+def _import(
+    database: Database,
+    target: Target,
+    file: tuple[Path, bytes | Path],
+    options: ImportOptions,
+    console: Console,
+    advance: Callable[[int, int], None],
+    *,
+    dry_run: bool,
+) -> int:
+    """One file and its line; how many of its impacts were refused.
+
+    It is read to its end before anything is stored: one that breaks in its midst stores nothing.
+    """
+    label, content = file
+    try:
+        total = sum(1 for _ in read_upload(content, options))
+        rows: list[dict[str, Any]] = []
+        found = read_upload(content, options)
+        while part := list(islice(found, CHUNK)):
+            rows += _chunk(database, target, part, len(rows), dry_run=dry_run)
+            advance(total, len(rows))
+    except Problem as problem:
+        console.print(f"{label}: refused: {problem_line(problem)}")
+        return 1
+    return _report(console, label, rows)
+
+
+def _chunk(
+    database: Database, target: Target, part: Sequence[Any], first: int, *, dry_run: bool
+) -> list[dict[str, Any]]:
+    with database.read() as conn:
+        known = look_up(conn, target.data_set_id, part)
+    items = score_found(part, known, target.terms)
+    if dry_run:
+        return [preview_row(index, item) for index, item in enumerate(items, first)]
+    ready = make_ready(items, None)
+    return database.write(lambda conn: store(conn, target.data_set_id, ready, first))
+
+
+def _report(console: Console, label: Path, rows: Sequence[Mapping[str, Any]]) -> int:
+    counts = summary(dict(row) for row in rows)
+    readable = sum(row["status"] == "readable" for row in rows)
+    told = [f"{counts[name]} {name}" for name in COUNTED if counts[name] or (name == "created" and not readable)]
+    console.print(f"{label}: {', '.join([f'{readable} readable', *told] if readable else told)}", markup=False)
+    failed = [row for row in rows if row["status"] == "failed"]
+    for row in failed[:SHOWN]:
+        name = row["external_id"] or f"impact {row['index']}"
+        console.print(f"    {name}: {row['problem']['detail']}", markup=False)
+    if len(failed) > SHOWN:
+        console.print(f"    and {len(failed) - SHOWN} more")
+    return len(failed)
