@@ -25,8 +25,7 @@ MAX_IMPACTS = 100_000
 class ImportOptions:
     """The fields of an import. `time_zone` places local times, of the file as of `occurred_at`.
 
-    `filename` and `content_type` only say what the sender calls the file; what it is, its content says. `max_values`
-    bounds the samples of all channels together where the whole file is to be held at once.
+    `filename` and `content_type` only say what the sender calls the file; what it is, its content says.
     """
 
     preset: str | None = None
@@ -42,7 +41,6 @@ class ImportOptions:
     filename: str | None = None
     content_type: str | None = None
     max_impacts: int = MAX_IMPACTS
-    max_values: int | None = None
 
     @classmethod
     def from_fields(cls, fields: Fields[str, str], **known: Any) -> ImportOptions:  # noqa: ANN401 - the other members

@@ -52,17 +52,12 @@ def read_upload(content: bytes | Path, options: ImportOptions) -> Impacts:
         preset_named(options.preset)
     source = Source(content)
     kind = detect(source.head(HEAD), filename=options.filename, content_type=options.content_type)
-    values = 0
-    for item in READERS[kind](source, options):
-        values += 0 if isinstance(item, Problem) else _values(item)
-        if options.max_values is not None and values > options.max_values:
-            raise Problem("import-too-large", f"An import may hold at most {options.max_values} samples at once.")
-        yield item
+    yield from READERS[kind](source, options)
 
 
-def _values(record: ImpactRecord) -> int:
-    """Samples of all channels."""
-    return sum(signal.values.size for _, signal in record.recording.signals())
+def sample_count(item: ImpactRecord | Problem) -> int:
+    """The samples of all channels of an impact."""
+    return 0 if isinstance(item, Problem) else sum(signal.values.size for _, signal in item.recording.signals())
 
 
 def _read_csv(source: Source, options: ImportOptions) -> Impacts:

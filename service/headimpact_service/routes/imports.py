@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from itertools import islice
 from typing import Annotated, Any, Literal
 
 from anyio.to_thread import run_sync
@@ -11,9 +10,11 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from starlette.responses import Response
 
 from headimpact_service.answers import answer
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import list_presets
-from headimpact_service.ingest.upload import read_upload
+from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.upload import read_upload, sample_count
 from headimpact_service.intake.importing import Found, preview_row, summary
 from headimpact_service.operation import ANY_KEY, Answer, BodyForm, Call, Routes
 from headimpact_service.parameters import Flag, Query, validate_parameters
@@ -26,6 +27,8 @@ from headimpact_service.routes.uploads import MULTIPART, RAW, Upload, received
 routes = Routes("imports")
 
 MAX_IMPACTS = 1000
+MAX_SAMPLES = 4_000_000
+"""Of all channels together: what is held at once; more is read by a job, part by part."""
 FieldText = Annotated[str | None, Field(max_length=200)]
 
 
@@ -88,7 +91,9 @@ class PresetList(BaseModel):
     problems=("invalid-parameter", "unreadable-file", "import-too-large", "idempotency-conflict"),
 )
 async def import_file(call: Call) -> Response:
-    """CSV (also of DTS), JSON, NDJSON, and zips of ISO-MME and NHTSA tests, told apart by their content.
+    """CSV (also of DTS), JSON, NDJSON, Parquet, Arrow IPC, MATLAB (-v7), xlsx, npz, zips of ISO-MME and NHTSA tests.
+
+    Their content tells them apart; the columns of each are described in docs/formats.md.
 
     Up to 1000 impacts and 16 MiB are answered at once, unless `Prefer: respond-async` asks for a job; more is a job.
     An impact whose athlete, time and signals are stored already is `unchanged`, whatever the file is called.
@@ -113,9 +118,15 @@ async def import_file(call: Call) -> Response:
 
 
 def _read(upload: Upload, options: ImportOptions) -> Found | None:
-    """The whole file first: where it breaks in its midst, nothing of it is stored. None for too many impacts."""
-    found = list(islice(read_upload(upload.file.contents(), options), MAX_IMPACTS + 1))
-    return found if len(found) <= MAX_IMPACTS else None
+    """The whole file first: where it breaks in its midst, nothing of it is stored. None for too much at once."""
+    found: list[ImpactRecord | Problem] = []
+    samples = 0
+    for item in read_upload(upload.file.contents(), options):
+        found.append(item)
+        samples += sample_count(item)
+        if len(found) > MAX_IMPACTS or samples > MAX_SAMPLES:
+            return None
+    return found
 
 
 @routes("GET", "/v1/presets", "List known layouts", ANY_KEY, {200: Answer(PresetList, "All presets.")})

@@ -22,6 +22,11 @@ RAW = (
     "text/csv",
     "application/json",
     "application/x-ndjson",
+    "application/vnd.apache.parquet",
+    "application/vnd.apache.arrow.file",
+    "application/vnd.apache.arrow.stream",
+    "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
+    "application/x-matlab-data",
     "application/zip",
     "application/octet-stream",
 )

@@ -14,7 +14,7 @@ from headimpact_service.ingest import csv_format, windows
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
-from headimpact_service.ingest.upload import read_upload
+from headimpact_service.ingest.upload import read_upload, sample_count
 
 
 def grouped(*names: str) -> str:
@@ -102,15 +102,9 @@ def test_a_document_that_is_held_whole_has_a_bound(tmp_path: Path):
         Source(path).read(999)
 
 
-def test_the_samples_that_are_held_at_once_have_a_bound():
-    assert len(read(grouped("a", "b"), max_values=480)) == 2
-    assert refused_after_bound() == "import-too-large"
-
-
-def refused_after_bound() -> str:
-    with pytest.raises(Problem) as raised:
-        read(grouped("a", "b"), max_values=479)
-    return raised.value.slug
+def test_the_samples_of_an_impact_are_counted_over_all_its_channels():
+    assert [sample_count(item) for item in read(grouped("a", "b"))] == [240, 240]
+    assert sample_count(Problem("unreadable-file", "x")) == 0
 
 
 def test_text_that_is_marked_utf8_and_is_not_is_refused():

@@ -89,6 +89,8 @@ def _texts(values: pa.Array) -> list[str]:
     if pa.types.is_timestamp(kind):
         micros = values.cast(pa.timestamp("us", kind.tz), safe=False).cast(pa.int64()).to_pylist()
         return ["" if value is None else _instant(value, placed=kind.tz is not None) for value in micros]
+    if pa.types.is_boolean(kind):
+        return ["" if value is None else str(value).lower() for value in values.to_pylist()]
     if pa.types.is_date(kind):
         return ["" if value is None else value.isoformat() for value in values.to_pylist()]
     raise unreadable("A column that is to be read as text holds something else.")
