@@ -12,6 +12,7 @@ from headimpact_service.errors import Problem
 JSON = "application/json"
 CSV = "text/csv"
 NDJSON = "application/x-ndjson"
+PARQUET = "application/vnd.apache.parquet"
 PROBLEM_JSON = "application/problem+json"
 
 

@@ -43,8 +43,8 @@ def head_recording(
         422: the curves of a signal differ in rate or unit, or do not overlap.
     """
     aligned = _aligned(signals)
-    start_s = min(float(curves[0].stamps_s[0]) for curves in aligned.values())
-    stamped = _rates_differ(aligned)
+    starts = {float(curves[0].stamps_s[0]) for curves in aligned.values()}
+    start_s, stamped = min(starts), len(starts) > 1
     sent: dict[str, Any] = {name: _signal(curves, stamped=stamped) for name, curves in aligned.items()}
     return Recording(
         axes=axes,
@@ -91,13 +91,16 @@ def _on_the_same_stamps(curves: Sequence[Curve]) -> list[Curve]:
 
 
 def _signal(curves: Sequence[Curve], *, stamped: bool) -> Signal:
-    """One signal on its rate or, where the signals' rates differ, on its stamps: they are on one clock."""
+    """One signal on its rate or, where the signals do not begin together, on its stamps: they are on one clock.
+
+    Stamps are thousandths of milliseconds, as all that can be sent again are.
+    """
     rate = None if stamped else curves[0].rate
     return Signal(
         values=_values(curves),
         unit=_unit(curves),
         sample_rate_hz=rate,
-        time_s=curves[0].stamps_s if rate is None else None,
+        time_s=curves[0].stamps_s * 1000.0 / 1000.0 if rate is None else None,
         declared_range=_range(curves),
     )
 

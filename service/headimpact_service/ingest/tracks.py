@@ -46,12 +46,13 @@ TimeBase = tuple[float | None, FloatArray | None]
 def time_bases(tracks: Sequence[Track]) -> list[TimeBase]:
     """The rate of each track, as stated or as its uniform stamps say, else its stamps.
 
-    A rate that is only said by stamps stands for them where all such tracks begin together: a rate says nothing of
-    when a signal begins.
+    A rate that is only said by stamps stands for them where all signals begin together: a rate says nothing of when a
+    signal begins, and nobody says when one of a stated rate does.
     """
     stamped = [track for track in tracks if track.rate is None and track.stamps is not None]
     times = {id(track.stamps): _seconds(track, _origin(stamped)) for track in stamped}
-    together = len({float(seconds[0]) for seconds in times.values() if seconds.size}) <= 1
+    starts = {float(seconds[0]) for seconds in times.values() if seconds.size}
+    together = len(starts) <= 1 and len(stamped) in {0, len(tracks)}
     rates = {key: nominal_rate(seconds) if together else None for key, seconds in times.items()}
     bases: list[TimeBase] = []
     for track in tracks:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from math import inf, nextafter
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,8 @@ from headimpact.recording import AXES, SIGNALS, Mounting, Recording, Signal
 from headimpact_service.ingest.record import ImpactRecord
 
 FloatArray = NDArray[np.float64]
-_TIME = ".time_s"
+TIME = ".time_s"
+"""Behind a signal's name, that of its stamps."""
 
 
 def arrays(recording: Recording) -> dict[str, FloatArray]:
@@ -25,7 +25,7 @@ def arrays(recording: Recording) -> dict[str, FloatArray]:
     for name, signal in recording.signals():
         found[name] = signal.values
         if signal.time_s is not None:
-            found[name + _TIME] = signal.time_s
+            found[name + TIME] = signal.time_s
     return found
 
 
@@ -110,7 +110,7 @@ def _rebuilt(name: str, described: Mapping[str, Any] | None, samples: Mapping[st
         values=samples[name],
         unit=described["unit"],
         sample_rate_hz=described["sample_rate_hz"],
-        time_s=samples.get(name + _TIME),
+        time_s=samples.get(name + TIME),
         declared_range=described["declared_range"],
     )
 
@@ -142,25 +142,26 @@ def _filter(low_pass: Mapping[str, Any]) -> Any:  # noqa: ANN401 - a name or an 
 
 def mounting_document(mounting: Mapping[str, Any]) -> dict[str, Any]:
     """A mounting as requests write it."""
-    offset_mm = [thousandfold(metres) for metres in mounting["offset_m"]]
-    delays = {name: thousandfold(mounting.get(f"{name}_delay_s", 0.0)) for name in ("accelerometer", "gyroscope")}
+    sensors = ("accelerometer", "gyroscope")
+    delays_ms = thousandfold(np.array([mounting.get(f"{name}_delay_s", 0.0) for name in sensors])).tolist()
+    offset_mm = thousandfold(np.array(mounting["offset_m"], dtype=np.float64)).tolist()
     shown: dict[str, Any] = {
         "accelerometer": {"rotation": mounting["accelerometer_rotation"], "offset_mm": offset_mm},
         "gyroscope": {"rotation": mounting["gyroscope_rotation"]},
     }
-    for name, delay_ms in delays.items():
+    for name, delay_ms in zip(sensors, delays_ms, strict=True):
         if delay_ms:
             shown[name]["delay_ms"] = delay_ms
     return shown
 
 
-def thousandfold(value: float) -> float:
-    """The number that, divided by 1000, gives `value` again: milli-units, as they were sent; the shortest of them."""
-    exact = value * 1000.0
-    for candidate in (round(exact, 9), exact, nextafter(exact, inf), nextafter(exact, -inf)):
-        if candidate / 1000.0 == value:
-            return candidate
-    return exact
+def thousandfold(values: FloatArray) -> FloatArray:
+    """Numbers that, divided by 1000, give `values` again: milli-units, as they were sent; the shortest of them."""
+    exact = values * 1000.0
+    found = exact
+    for candidate in (np.nextafter(exact, -np.inf), np.nextafter(exact, np.inf), exact, np.round(exact, 9)):
+        found = np.where(candidate / 1000.0 == values, candidate, found)
+    return found
 
 
 def raw_traces(document: Mapping[str, Any], samples: Mapping[str, FloatArray]) -> dict[str, Any]:
@@ -172,8 +173,8 @@ def raw_traces(document: Mapping[str, Any], samples: Mapping[str, FloatArray]) -
 
 
 def _raw(name: str, described: Mapping[str, Any], samples: Mapping[str, FloatArray]) -> dict[str, Any]:
-    stamps = samples.get(name + _TIME)
-    time_ms = None if stamps is None else [thousandfold(stamp) for stamp in stamps.tolist()]
+    stamps = samples.get(name + TIME)
+    time_ms = None if stamps is None else thousandfold(stamps).tolist()
     rate = {"sample_rate_hz": described["sample_rate_hz"], "time_ms": time_ms}
     return {"unit": described["unit"], **rate, **axes_lists(samples[name])}
 

@@ -16,8 +16,9 @@ from headimpact_service.ingest.impact_json import Name, Strict, Word
 from headimpact_service.ingest.times import known_zone
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import SyncQuery
-from headimpact_service.routes.lists import MEDIA_TYPES, Cell, Listing, answer_list
+from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
+from headimpact_service.routes.tables import Cell
 from headimpact_service.store import athletes, ids
 from headimpact_service.store.athletes import Athlete, AthleteFields
 

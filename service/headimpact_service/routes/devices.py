@@ -16,8 +16,9 @@ from headimpact_service.ingest.impact_json import PRINTABLE, MountingBody, Name,
 from headimpact_service.ingest.impact_reading import mounting
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import SyncQuery
-from headimpact_service.routes.lists import MEDIA_TYPES, Cell, Listing, answer_list
+from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
+from headimpact_service.routes.tables import Cell
 from headimpact_service.store import devices, ids
 from headimpact_service.store.devices import Device, DeviceFields
 
@@ -135,6 +136,7 @@ async def list_devices(call: Call) -> Response:
         document,
         ("id", "serial", *_SCALARS, "revision", "created_at", "updated_at"),
         _cells,
+        numbers=_NUMBERS,
     )
     return await answer_list(call, listing, query)
 
@@ -167,6 +169,9 @@ def _serial(call: Call) -> str:
 
 
 _SCALARS = tuple(name for name in _FIELDS if name not in {"mounting", "metadata"})
+
+
+_NUMBERS = frozenset({"linear_acceleration_range_g", "angular_velocity_range_rad_s", "trigger_threshold_g"})
 
 
 def document(device: Device) -> dict[str, Any]:

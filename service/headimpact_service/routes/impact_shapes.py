@@ -9,10 +9,11 @@ from pydantic import Field
 
 from headimpact.quality import QualityNote
 from headimpact_service.ingest.impact_json import Filter, MountingBody
+from headimpact_service.intake.exporting import CONTEXT, CONTEXT_NUMBERS, context_of
 from headimpact_service.intake.records import kinematics_document
 from headimpact_service.intake.rendering import note_document, score_document
-from headimpact_service.routes.lists import Cell
 from headimpact_service.routes.score_shapes import ScoreView, Shape
+from headimpact_service.routes.tables import Cell
 from headimpact_service.store import ids
 from headimpact_service.store.impact_lists import DUPLICATE
 from headimpact_service.store.impact_rows import Impact
@@ -104,7 +105,7 @@ def impact_document(impact: Impact) -> dict[str, Any]:
         return document | {"revision": impact.revision, **times}
     document["occurred_at"] = impact.occurred_at
     document["device"] = None if impact.device_serial is None else {"serial": impact.device_serial}
-    document["context"] = _context(impact)
+    document["context"] = context_of(impact)
     document["kinematics"] = kinematics_document(impact.document)
     document["source"] = impact.document["metadata"]
     document["duplicate_of"] = None if impact.duplicate_of is None else ids.encode("imp", impact.duplicate_of)
@@ -121,16 +122,6 @@ def _athlete(impact: Impact) -> dict[str, Any] | None:
     return {"id": ids.encode("ath", impact.athlete_id), "external_id": impact.athlete_external_id}
 
 
-def _context(impact: Impact) -> dict[str, Any]:
-    named = {
-        "session_id": impact.session_id,
-        "activity": impact.activity,
-        "sport": impact.sport,
-        "position": impact.position,
-    }
-    return {name: value for name, value in named.items() if value is not None} | dict(impact.context or {})
-
-
 def _score(impact: Impact, score: Score) -> dict[str, Any]:
     """The score, with a note where an earlier impact has the same signals."""
     document = score_document(score)
@@ -141,6 +132,7 @@ def _score(impact: Impact, score: Score) -> dict[str, Any]:
     return document
 
 
+_REST = tuple(name for name in CONTEXT if name not in {"session_id", "activity", "sport", "position"})
 COLUMNS = (
     "id",
     "external_id",
@@ -168,8 +160,19 @@ COLUMNS = (
     "created_at",
     "updated_at",
     "deleted_at",
+    *_REST,
 )
 """Of an impact as a row of a table. `outcome` is empty as long as nobody has labelled the impact."""
+NUMBERS = CONTEXT_NUMBERS | {
+    "incidence",
+    *VALUE_COLUMNS,
+    *PROBABILITY_COLUMNS,
+    "brain_angle_resultant",
+    "peak_resultant_linear_acceleration_g",
+    "peak_resultant_angular_velocity_rad_s",
+    "peak_resultant_angular_acceleration_rad_s2",
+}
+"""Those of :data:`COLUMNS` that hold numbers."""
 
 
 def impact_cells(impact: Impact) -> list[Cell]:
@@ -193,6 +196,7 @@ def impact_cells(impact: Impact) -> list[Cell]:
         impact.created_at,
         impact.updated_at,
         impact.deleted_at,
+        *((impact.context or {}).get(name) for name in _REST),
     ]
 
 

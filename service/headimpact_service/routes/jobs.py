@@ -13,7 +13,8 @@ from headimpact_service.errors import Problem
 from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
 from headimpact_service.parameters import ListQuery
 from headimpact_service.routes.job_shapes import JobKind, JobList, JobView, State, job_document
-from headimpact_service.routes.lists import MEDIA_TYPES, Cell, Listing, answer_list
+from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
+from headimpact_service.routes.tables import Cell
 from headimpact_service.store import ids, jobs
 from headimpact_service.store.jobs import Job
 

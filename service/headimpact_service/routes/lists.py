@@ -2,32 +2,31 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any, Generic, TypeVar
 
+from anyio.to_thread import run_sync
 from starlette.responses import Response, StreamingResponse
 
 from headimpact_service import deps
-from headimpact_service.answers import CSV, JSON, NDJSON, answer, json_bytes
+from headimpact_service.answers import CSV, JSON, NDJSON, PARQUET, answer
 from headimpact_service.operation import Call
 from headimpact_service.parameters import ListQuery
+from headimpact_service.routes.tables import Cell, Form, Kind, table_form
 from headimpact_service.store.paging import Page, Position, Positioned, decode_cursor, encode_cursor
 
 Row = TypeVar("Row", bound=Positioned)
-Cell = str | float | int | bool | datetime | None
 
-MEDIA_TYPES = (JSON, CSV, NDJSON)
+MEDIA_TYPES = (JSON, CSV, NDJSON, PARQUET)
 """What a list can be answered as, the preferred one first."""
 PAGE_OF_TABLE = 1000
 """Rows that a table reads at a time, so that no reader holds the database for long."""
 
 NEXT_CURSOR = "X-Next-Cursor"
-# A spreadsheet takes a cell that begins with one of these for a formula.
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_INTEGERS = frozenset({"revision", "birth_year", "done", "total"})
+_INSTANTS = "_at"
+"""How the names of columns of times end, of every list."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +38,27 @@ class Listing(Generic[Row]):
     """Of a connection, a position and a limit."""
     document: Callable[[Row], Mapping[str, Any]]
     columns: Sequence[str]
-    cells: Callable[[Row], Iterable[Cell]]
+    cells: Callable[[Row], Sequence[Cell]]
+    numbers: frozenset[str] = frozenset()
+    flags: frozenset[str] = frozenset()
+    form: Callable[[str], Form] | None = None
+    """Of a media type, where a table is not one row of `cells` for each row of the list."""
+    parts: Callable[[Sequence[Row]], AsyncIterator[Sequence[Any]]] | None = None
+    """What such a form takes, from some rows of the list."""
+
+    @property
+    def kinds(self) -> Mapping[str, Kind]:
+        """The types of the columns that hold no text."""
+        return {name: kind for name in self.columns if (kind := self._kind(name)) != "text"}
+
+    def _kind(self, name: str) -> Kind:
+        if name in self.numbers:
+            return "number"
+        if name in self.flags:
+            return "flag"
+        if name in _INTEGERS:
+            return "integer"
+        return "instant" if name.endswith(_INSTANTS) else "text"
 
 
 async def answer_list(call: Call, listing: Listing[Row], query: ListQuery) -> Response:
@@ -56,10 +75,17 @@ async def answer_list(call: Call, listing: Listing[Row], query: ListQuery) -> Re
     cursor = None if page.next is None else encode_cursor(page.next, mark)
     if call.media_type == JSON:
         return answer({"data": [listing.document(row) for row in page.rows], "next_cursor": cursor})
-    encode = _csv_rows if call.media_type == CSV else _json_rows
+    form = await run_sync(_form, call.media_type, listing)
     headers = {NEXT_CURSOR: cursor} if cursor is not None and not whole else {}
-    stream = _stream(call, listing, page, encode, whole=whole)
-    return StreamingResponse(stream, media_type=call.media_type, headers=headers)
+    return StreamingResponse(
+        _stream(call, listing, page, form, whole=whole), media_type=call.media_type, headers=headers
+    )
+
+
+def _form(media_type: str, listing: Listing[Row]) -> Form:
+    if listing.form is not None:
+        return listing.form(media_type)
+    return table_form(media_type, listing.columns, listing.kinds, listing.cells)
 
 
 def _mark(call: Call, listing: Listing[Row], query: ListQuery) -> str:
@@ -72,39 +98,21 @@ async def _read(call: Call, listing: Listing[Row], after: Position | None, limit
     return await deps.read(call.request, lambda conn: listing.page(conn, after, limit))
 
 
-Encoder = Callable[[Listing[Any], Sequence[Any], bool], bytes]
-
-
 async def _stream(
-    call: Call, listing: Listing[Row], page: Page[Row], encode: Encoder, *, whole: bool
+    call: Call, listing: Listing[Row], page: Page[Row], form: Form, *, whole: bool
 ) -> AsyncIterator[bytes]:
-    yield encode(listing, page.rows, True)
-    while whole and page.next is not None:
+    while True:
+        async for part in _parts(listing, page.rows):
+            yield await run_sync(form.encode, part)
+        if not whole or page.next is None:
+            break
         page = await _read(call, listing, page.next, PAGE_OF_TABLE)
-        yield encode(listing, page.rows, False)
+    yield await run_sync(form.finish)
 
 
-def _csv_rows(listing: Listing[Row], rows: Sequence[Row], first: bool) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text)
-    if first:
-        writer.writerow(listing.columns)
-    writer.writerows([_csv_cell(cell) for cell in listing.cells(row)] for row in rows)
-    return text.getvalue().encode()
-
-
-def _csv_cell(cell: Cell) -> str | float | int | None:
-    if isinstance(cell, str):
-        return "'" + cell if cell.startswith(_FORMULA) else cell
-    if isinstance(cell, bool):
-        return "true" if cell else "false"
-    return timestamp(cell) if isinstance(cell, datetime) else cell
-
-
-def _json_rows(listing: Listing[Row], rows: Sequence[Row], first: bool) -> bytes:  # noqa: ARG001 - no heading
-    return b"".join(json_bytes(dict(zip(listing.columns, listing.cells(row), strict=True))) + b"\n" for row in rows)
-
-
-def timestamp(moment: datetime) -> str:
-    """An instant as JSON shows it."""
-    return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
+async def _parts(listing: Listing[Row], rows: Sequence[Row]) -> AsyncIterator[Sequence[Any]]:
+    if listing.parts is None:
+        yield rows
+        return
+    async for part in listing.parts(rows):
+        yield part

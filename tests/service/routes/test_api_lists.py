@@ -5,8 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
+import sys
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from sending import Api, impact_body
 
@@ -170,6 +173,38 @@ class TestTables:
         for path, column in (("/v1/athletes", "external_id"), ("/v1/devices", "serial")):
             rows = list(csv.DictReader(io.StringIO(api.get(path, headers={"Accept": "text/csv"}).text)))
             assert rows[0][column] in {"p-17", "mg-1"}
+
+    def test_parquet_is_the_same_table_with_typed_columns(self, api: Api) -> None:
+        impact = api.create("e-1", device={"serial": "mg-1"}, context={"firmware": "2.1", "worn": True})
+        headers = {"Accept": "application/vnd.apache.parquet"}
+        answer = api.get("/v1/impacts", headers=headers)
+        assert answer.headers["content-type"] == "application/vnd.apache.parquet"
+        table = pq.read_table(io.BytesIO(answer.content))
+        assert tuple(table.column_names) == COLUMNS
+        row = table.to_pylist()[0]
+        assert row["bam_y"] == impact["score"]["criteria"]["bam"]["value"]["y"]
+        assert row["occurred_at"].isoformat() == "2026-11-20T19:04:05.123000+00:00"
+        assert (row["revision"], row["firmware"], row["worn"]) == (1, "2.1", True)
+        for name in (*VALUE_COLUMNS, *PROBABILITY_COLUMNS, "incidence"):
+            assert table.schema.field(name).type == pa.float64(), name
+        for path in ("/v1/athletes", "/v1/devices", "/v1/jobs"):
+            assert api.get(path, headers=headers).status_code == 200, path
+
+    def test_parquet_is_written_row_group_by_row_group(self, api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("headimpact_service.routes.lists.PAGE_OF_TABLE", 2)
+        monkeypatch.setattr("headimpact_service.routes.tables.ROW_GROUP", 2)
+        for i in range(5):
+            api.create(f"e-{i}")
+        answer = api.get("/v1/impacts", headers={"Accept": "application/vnd.apache.parquet"})
+        file = pq.ParquetFile(io.BytesIO(answer.content))
+        assert (file.num_row_groups, file.metadata.num_rows) == (3, 5)
+
+    def test_without_the_library_parquet_is_406_and_names_the_extra(
+        self, api: Api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+        answer = api.get("/v1/impacts", headers={"Accept": "application/vnd.apache.parquet"})
+        assert (answer.status_code, "headimpact[files]" in answer.json()["detail"]) == (406, True)
 
     @pytest.mark.parametrize(
         ("accept", "content_type"),
