@@ -17,6 +17,7 @@ from sending import Api
 from headimpact.criteria import CRITERIA
 from headimpact.criteria.extra import EXTRA_CRITERIA
 from headimpact_service import __version__
+from headimpact_service.__main__ import app
 from headimpact_service.app import OPERATIONS
 from headimpact_service.deps import SCOPES
 from headimpact_service.settings import Settings
@@ -191,6 +192,14 @@ def test_every_path_that_the_documents_name_is_an_operation() -> None:
     }
     assert named
     assert {(method, path) for _, method, path in named} <= known
+
+
+def test_every_command_that_the_documents_name_exists() -> None:
+    known = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
+    known |= {str(group.name) for group in app.registered_groups}
+    shown = [part for page in PAGES for part in [*spans(prose(page)), *blocks(name_of(page))]]
+    named = {name for part in shown for name in re.findall(r"\bheadimpact ([a-z]+)\b", part)}
+    assert {"serve", "keys", "score"} <= named <= known
 
 
 # Versions and decisions
