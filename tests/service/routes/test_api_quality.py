@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
@@ -93,6 +94,22 @@ class TestGaps:
         assert impact["score"]["criteria"]["bam"]["value"] == pytest.approx(
             whole["score"]["criteria"]["bam"]["value"], rel=1e-9
         )
+
+    def test_an_import_says_so_in_a_field_beside_the_file(self, api: Api) -> None:
+        body = self.gappy(40, fill_gaps=False)
+        form = {"file": ("i.json", json.dumps([body]), "application/json")}
+        assert api.post("/v1/imports", files=form).json()["summary"]["failed"] == 1
+        body["kinematics"]["fill_gaps"] = True
+        form = {"file": ("i.json", json.dumps([body]), "application/json")}
+        assert api.post("/v1/imports", files=form).json()["summary"]["created"] == 1
+        rows = "t_s,ax_g,ay_g,az_g\n" + "\n".join(f"{i / 1000},{'' if i == 40 else i % 7},1,2" for i in range(90))
+        table = {"file": ("t.csv", rows, "text/csv")}
+        assert api.post("/v1/imports", files=table).json()["summary"]["failed"] == 1
+        answer = api.post("/v1/imports", files=table, data={"fill_gaps": "true"}).json()
+        stored = api.get(f"/v1/impacts/{answer['data'][0]['id']}").json()
+        assert notes(stored, "gaps_filled")
+        wrong = api.post("/v1/imports", files=table, data={"fill_gaps": "perhaps"})
+        assert (wrong.status_code, wrong.json()["errors"][0]["parameter"]) == (422, "fill_gaps")
 
 
 class TestDevices:
