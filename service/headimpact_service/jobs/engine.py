@@ -5,6 +5,7 @@ It starts DBOS with the first job, not before: its import costs seconds and some
 
 from __future__ import annotations
 
+import gc
 import logging
 import threading
 import time
@@ -104,7 +105,11 @@ class Engine:
     def _launch(self, slot: Slot) -> Transact:
         from headimpact_service.jobs.transact import Transact  # costs seconds: not before there is a job
 
-        return Transact(self._folder / "engine.db", slot.name, self._run, at_once=self._at_once)
+        launched = Transact(self._folder / "engine.db", slot.name, self._run, at_once=self._at_once)
+        # What was loaded stays; the many objects of a part would have the collector look through it again and again.
+        gc.collect()
+        gc.freeze()
+        return launched
 
     def _bring(self, transact: Transact, unfinished: Iterable[Job]) -> None:
         """Order a run of every job that has none; one whose run ended without ending the job gets another."""
