@@ -200,7 +200,9 @@ class TestImport:
         file = tmp_path / "impacts.ndjson"
         bad = impact_body("bad")
         del bad["kinematics"]["linear_acceleration"]["unit"]
-        file.write_text("\n".join(json.dumps(body) for body in (impact_body("e-0"), bad, impact_body("e-2", scale=0.5))))
+        file.write_text(
+            "\n".join(json.dumps(body) for body in (impact_body("e-0"), bad, impact_body("e-2", scale=0.5)))
+        )
         database = f"sqlite:///{tmp_path / 'x.db'}"
         code, printed, _ = run("import", str(file), "--database-url", database)
         assert code == 2
