@@ -136,9 +136,8 @@ def show(when: str, loads: list[Load]) -> None:
 def resident_mib(pid: int) -> tuple[float, float]:
     """The most memory that a process took, and its children take now."""
     own = _status(pid, "VmHWM")
-    listed = Path(f"/proc/{pid}/task/{pid}/children")
-    children = [_status(int(child), "VmHWM") for child in listed.read_text().split()]
-    return own, max(children, default=0.0)
+    listed = [path.read_text().split() for path in Path(f"/proc/{pid}/task").glob("*/children")]
+    return own, max((_status(int(child), "VmHWM") for children in listed for child in children), default=0.0)
 
 
 def _status(pid: int, name: str) -> float:
