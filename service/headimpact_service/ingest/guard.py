@@ -35,6 +35,8 @@ TURN_S = 30.0
 START_S = 60.0
 WAIT_BASE_S = 12.0
 WAIT_S_PER_MIB = 3.0
+_PROCESSES = {"parquet": "arrow"}
+"""Formats that are read by the process of another."""
 _MODULE = "headimpact_service.ingest.guarded.worker"
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",
@@ -142,11 +144,12 @@ class GuardedLines:
 class Reading:
     """One file being read by one process."""
 
-    def __init__(self, worker: Worker, size: int) -> None:
+    def __init__(self, kind: str, worker: Worker, size: int) -> None:
         """Wait for it no longer than a file of `size` bytes may take."""
-        self._worker = worker
+        self._kind, self._worker = kind, worker
         self._deadline = Deadline(WAIT_BASE_S + WAIT_S_PER_MIB * size / 1024**2)
-        self._asked = True  # no table waits for an answer
+        self._offered = False  # a table waits for an answer
+        self._open = False  # its blocks are coming
         self.worker_stays = False
 
     def contents(self) -> Iterator[GuardedTable | GuardedLines]:
@@ -155,16 +158,18 @@ class Reading:
             if frame.kind == "lines":
                 yield GuardedLines(self)
                 continue
-            self._asked = False
+            self._offered = True
             yield GuardedTable(self, frame)
-            if not self._asked:
-                self._asked = True
+            if self._offered:
+                self._offered = False
                 send(self._worker.connection, Frame("skip"))
+            while self._open:
+                self.next()
         self._rest()
 
     def stop(self) -> None:
         """Ask for no more where the process waits to be asked, so that it can take another file."""
-        if not self._asked:
+        if self._offered:
             with suppress(WireError, Problem):
                 send(self._worker.connection, Frame("stop"))
                 if self.next().kind == "end":
@@ -172,21 +177,23 @@ class Reading:
 
     def want(self, numbers: Sequence[int], texts: Sequence[int]) -> None:
         """Ask for columns of the table that was announced last."""
-        self._asked = True
+        self._offered, self._open = False, True
         send(self._worker.connection, Frame("read", {"numbers": list(numbers), "texts": list(texts)}))
 
     def next(self) -> Frame:
         """What comes next; :class:`Problem` where the file is at fault."""
         frame = receive(self._worker.connection, self._deadline)
+        if frame.kind == "table_end":
+            self._open = False
         if frame.kind == "refused":
             self._rest()
             raise Problem(str(frame.fields["slug"]), str(frame.fields["detail"]))
         if frame.kind == "exhausted":
             _refuse_excess()
         if frame.kind == "broken":
-            _log.info("file_broken", extra={"format": self._worker.kind, "error": frame.fields["error"]})
+            _log.info("file_broken", extra={"format": self._kind, "error": frame.fields["error"]})
             self._rest()
-            raise Problem("unreadable-file", f"The {self._worker.kind} file is broken, or not what its beginning says.")
+            raise Problem("unreadable-file", f"The {self._kind} file is broken, or not what its beginning says.")
         return frame
 
     def _rest(self) -> None:
@@ -205,8 +212,8 @@ def guarded(kind: str, source: Source) -> Iterator[Iterator[GuardedTable | Guard
         one that is broken.
     """
     with _POOL.turn(), _descriptor(source) as stream:
-        worker = _POOL.take(kind)
-        reading = Reading(worker, source.size)
+        worker = _POOL.take(_PROCESSES.get(kind, kind))
+        reading = Reading(kind, worker, source.size)
         try:
             worker.hand_over(stream)
             yield reading.contents()

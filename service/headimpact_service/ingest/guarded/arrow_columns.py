@@ -17,6 +17,7 @@ UNIT_KEYS = (b"unit", b"units")
 ROWS_AT_ONCE = 8192
 MAX_LIST = 20_001
 """Of a longer list this much is read: one sample more than an impact may have, which is then refused by name."""
+_NO_TEXT = "A column that is to be read as text holds something else."
 _EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
 
 Batches = Callable[[list[int]], Iterator[pa.RecordBatch]]
@@ -74,6 +75,8 @@ def floats(column: pa.Array) -> FloatArray:
 
 def words(column: pa.Array) -> list[str]:
     """A column as text: names and numbers as they are, times as RFC 3339 has them; empty where a cell is."""
+    if pa.types.is_nested(column.type):
+        raise unreadable(_NO_TEXT)
     encoded = column if isinstance(column, pa.DictionaryArray) else column.dictionary_encode()
     known = [checked_text(text) for text in _texts(encoded.dictionary)] + [""]
     codes = pc.fill_null(encoded.indices.cast(pa.int64()), len(known) - 1).to_numpy(zero_copy_only=False)
@@ -93,7 +96,7 @@ def _texts(values: pa.Array) -> list[str]:
         return ["" if value is None else str(value).lower() for value in values.to_pylist()]
     if pa.types.is_date(kind):
         return ["" if value is None else value.isoformat() for value in values.to_pylist()]
-    raise unreadable("A column that is to be read as text holds something else.")
+    raise unreadable(_NO_TEXT)
 
 
 def _instant(microseconds: int, *, placed: bool) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import decimal
 import json
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import pyarrow as pa
+
+from headimpact_service.ingest.guarded.arrow_columns import words
 
 ROWS_AT_ONCE = 64
 _INDEX = "__index_level_"
@@ -25,8 +26,17 @@ def lines(batches: Iterable[pa.RecordBatch]) -> Iterator[bytes]:
     """Each row as a line of JSON, without the members that are null."""
     for batch in batches:
         for start in range(0, batch.num_rows, ROWS_AT_ONCE):
-            rows = batch.slice(start, ROWS_AT_ONCE).to_pylist()
+            rows = _with_text_for_times(batch.slice(start, ROWS_AT_ONCE)).to_pylist()
             yield b"".join(json.dumps(_without_nulls(row), default=_as_json).encode() + b"\n" for row in rows)
+
+
+def _with_text_for_times(batch: pa.RecordBatch) -> pa.RecordBatch:
+    """Times as RFC 3339 has them: as Python's they would need the system's file of their zone."""
+    for place, field in enumerate(batch.schema):
+        if pa.types.is_timestamp(field.type):
+            texts = [text or None for text in words(batch.column(place))]
+            batch = batch.set_column(place, field.name, pa.array(texts, pa.string()))
+    return batch
 
 
 def _without_nulls(row: Any) -> Any:  # noqa: ANN401 - any JSON
@@ -37,8 +47,6 @@ def _without_nulls(row: Any) -> Any:  # noqa: ANN401 - any JSON
 
 
 def _as_json(value: Any) -> Any:  # noqa: ANN401 - any cell
-    if isinstance(value, dt.datetime | dt.date):
-        return value.isoformat()
     if isinstance(value, decimal.Decimal):
         return float(value)
     raise TypeError(f"A cell of {type(value).__name__} has no place in JSON.")

@@ -27,6 +27,8 @@ MAX_INFLATED = 32 * 1024 * 1024
 MAX_ELEMENTS = 10_000
 MAX_FIELDS = 100
 MAX_WIDTH = 64
+ALONE = "array"
+"""The other name of an array that is the only one."""
 _HEADER = 128
 _COMPRESSED = 15
 _BLOCK = 64 * 1024
@@ -113,8 +115,8 @@ def _arrays(variables: dict[str, Any]) -> ArrayTable:
         raise unreadable(f"The last dimension of an array of samples is its 1 to {MAX_WIDTH} components.")
     impacts = next(iter(solid.values())).shape[0]
     samples = [_samples(name, value) for name, value in solid.items()]
-    if len(solid) == 1:
-        samples.append(_samples("array", next(iter(solid.values()))))
+    if len(solid) == 1 and ALONE not in solid:
+        samples.append(_samples(ALONE, next(iter(solid.values()))))
     facts = [Fact(name, None, texts) for name, value in variables.items() if (texts := _texts_of(value, impacts))]
     return ArrayTable(samples, facts, {})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tokenize
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -70,7 +71,7 @@ def _member(archive: GuardedZip, file: str) -> _Member:
             version = np.lib.format.read_magic(stream)
             read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
             shape, by_columns, dtype = read(stream, max_header_size=MAX_HEADER)
-        except (ValueError, KeyError, SyntaxError, RecursionError, EOFError):
+        except (ValueError, KeyError, SyntaxError, RecursionError, EOFError, tokenize.TokenError):
             raise unreadable("The header of an array in the npz archive is broken.") from None
         header = stream.tell()
     if dtype.hasobject:
@@ -190,9 +191,8 @@ def _texts(archive: GuardedZip, member: _Member) -> list[str]:
     values = _whole(archive, member).reshape(-1)
     if member.dtype.kind == "M":
         return ["" if text == "NaT" else f"{text}Z" for text in np.datetime_as_string(values, unit="us").tolist()]
-    if member.dtype.kind == "S":
-        values = np.char.decode(values, "latin-1")
-    texts = [checked_text(text) for text in values.tolist()]
+    cells = values.tolist()
+    texts = [checked_text(cell.decode("latin-1") if isinstance(cell, bytes) else cell) for cell in cells]
     return texts or [""]
 
 

@@ -22,7 +22,7 @@ MAX_FOOTER = 4 * 1024 * 1024
 MAX_ITEMS = 100_000
 """Of one list in the footer: columns, row groups."""
 BUFFER = 64 * 1024
-_MAGIC = b"PAR1"
+MAGIC = b"PAR1"
 
 
 def contents(stream: BinaryIO) -> Iterator[Content]:
@@ -76,7 +76,7 @@ def _require_small_footer(stream: BinaryIO) -> None:
     size = stream.seek(0, io.SEEK_END)
     stream.seek(max(0, size - 8))
     ending = stream.read(8)
-    if ending[4:] != _MAGIC:
+    if ending[4:] != MAGIC:
         raise unreadable("The Parquet file is cut off: it has no footer.")
     if int.from_bytes(ending[:4], "little") > MAX_FOOTER:
         raise unreadable(f"The footer of a Parquet file may have at most {MAX_FOOTER} bytes: write fewer columns.")

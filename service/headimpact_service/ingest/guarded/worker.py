@@ -23,8 +23,7 @@ from headimpact_service.ingest.guarded.wire import Array, Deadline, Frame, WireE
 from headimpact_service.ingest.table import Columns
 
 FORMATS = {
-    "parquet": "parquet_file",
-    "arrow": "arrow_file",
+    "arrow": "columnar_file",
     "npz": "npz_file",
     "mat": "mat_file",
     "xlsx": "xlsx_file",

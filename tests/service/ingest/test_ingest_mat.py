@@ -1,0 +1,154 @@
+"""MATLAB files of version 5: the laboratory's arrays and structs by preset, any other array by a mapping."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from binary_files import mat, noise, structs
+from ingest_files import codes, read, refused
+
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.record import ImpactRecord
+
+PRESET = "stanford_mat"
+TIMES_S = np.arange(-10, 90) / 1000.0
+
+
+def records(data: bytes, **options: Any) -> list[ImpactRecord]:
+    found = read(data, **options)
+    assert all(isinstance(item, ImpactRecord) for item in found), found[0]
+    return [item for item in found if isinstance(item, ImpactRecord)]
+
+
+def samples_of(record: ImpactRecord) -> np.ndarray:
+    return np.concatenate([signal.values for _, signal in record.recording.signals()], axis=1)
+
+
+def impacts(values: np.ndarray, times: np.ndarray = TIMES_S, *, lying: bool = False) -> np.ndarray:
+    """The laboratory's struct array."""
+    turned = (lambda part: part.T) if lying else (lambda part: part)
+    return structs(
+        *(
+            {
+                "t": times if lying else times[:, None],
+                "lin_acc_CG": turned(sent[:, :3]),
+                "ang_vel": turned(sent[:, 3:]),
+                "ang_acc": turned(sent[:, 3:] * 100.0),
+                "name": f"hit {number}",
+            }
+            for number, sent in enumerate(values)
+        )
+    )
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("name", ["impacts", "x", "array"])
+def test_an_array_of_impacts_is_read_by_the_preset(compressed: bool, name: str):
+    values = noise(5, 100)
+    found = records(mat({name: values, "label": "from the field"}, do_compression=compressed), preset=PRESET)
+    np.testing.assert_array_equal(np.stack([samples_of(record) for record in found]), values)
+    signals = found[0].recording.signals()
+    assert [(which, signal.unit, signal.sample_rate_hz) for which, signal in signals] == [
+        ("linear_acceleration", "g", 1000.0),
+        ("angular_velocity", "rad/s", 1000.0),
+    ]
+    assert found[0].recording.pre_trigger_ms == 10.0
+    assert found[0].metadata == {"format": "mat", "preset": PRESET}
+
+
+@pytest.mark.parametrize("lying", [False, True])
+@pytest.mark.parametrize("factor", [1.0, 1000.0])
+def test_a_struct_array_has_times_of_its_own_in_seconds_or_milliseconds(factor: float, lying: bool):
+    values = noise(3, 100)
+    found = records(mat({"impact": impacts(values, TIMES_S * factor, lying=lying)}), preset=PRESET)
+    for record, sent in zip(found, values, strict=True):
+        expected = np.concatenate((sent, sent[:, 3:] * 100.0), axis=1)
+        np.testing.assert_array_equal(samples_of(record), expected)
+        assert [which for which, _ in record.recording.signals()][2] == "angular_acceleration"
+        assert {signal.sample_rate_hz for _, signal in record.recording.signals()} == {1000.0}
+        assert record.recording.pre_trigger_ms == 10.0
+
+
+def test_a_struct_of_another_rate_is_not_taken_for_one_of_1_khz():
+    data = mat({"impact": impacts(noise(2, 100), TIMES_S * 0.37)})
+    assert codes(refused(data, preset=PRESET)) == [("sample_rate_hz", "rate-missing")]
+    mapping = Mapping.model_validate({"time": {"column": "t", "unit": "s"}})
+    found = records(data, preset=PRESET, mapping=mapping)
+    assert found[0].recording.signals()[0][1].sample_rate_hz == pytest.approx(1000.0 / 0.37)
+    assert found[0].recording.pre_trigger_ms == pytest.approx(3.7)
+
+
+def test_elements_of_a_struct_may_differ_in_length():
+    both = np.concatenate((impacts(noise(1, 100)), impacts(noise(1, 60), TIMES_S[:60])), axis=1)
+    found = records(mat({"impact": both}), preset=PRESET)
+    assert [record.recording.signals()[0][1].values.shape[0] for record in found] == [100, 60]
+
+
+def test_fields_of_one_element_may_differ_in_length():
+    [[element]] = impacts(noise(1, 100))
+    element["ang_acc"] = element["ang_acc"][:80]
+    [record] = records(mat({"impact": np.array([[element]])}), preset=PRESET)
+    assert [signal.values.shape[0] for _, signal in record.recording.signals()] == [100, 100, 80]
+
+
+def test_names_and_other_arrays_are_reached_by_a_mapping():
+    mapping = {
+        "linear_acceleration": {"unit": "m/s^2"} | {axis: f"acc_{axis}" for axis in "xyz"},
+        "external_id": "names",
+        "device": "mouthguard",
+        "sample_rate_hz": 3200,
+    }
+    names = np.array(["first", "second"], dtype=object)
+    data = mat({"acc": noise(2)[..., :3], "names": names, "mouthguard": np.array([[41.0], [42.0]])})
+    first, second = records(data, mapping=Mapping.model_validate(mapping))
+    assert (first.external_id, second.external_id) == ("first", "second")
+    assert (first.device_serial, second.device_serial) == ("41", "42")
+    assert first.recording.signals()[0][1].unit == "m/s^2"
+    named = Mapping.model_validate({"external_id": "name"})
+    assert [
+        record.external_id for record in records(mat({"impact": impacts(noise(2, 100))}), preset=PRESET, mapping=named)
+    ] == [
+        "hit 0",
+        "hit 1",
+    ]
+
+
+def test_without_the_preset_no_unit_is_guessed():
+    assert codes(refused(mat({"impact": impacts(noise(1, 100))}))) == [("/angular_velocity/unit", "unit-missing")]
+    assert codes(refused(mat({"impacts": noise(1, 100)}))) == [("mapping", "layout-unknown")]
+
+
+def test_many_impacts_come_block_by_block():
+    values = noise(400, 100)
+    found = records(mat({"a": values}), preset=PRESET)
+    np.testing.assert_array_equal(np.stack([samples_of(record) for record in found]), values)
+    found = records(mat({"impact": impacts(values)}), preset=PRESET)
+    np.testing.assert_array_equal(np.stack([samples_of(record)[:, :6] for record in found]), values)
+
+
+@pytest.mark.parametrize(
+    ("variables", "said"),
+    [
+        ({}, "neither a struct array nor"),
+        ({"a": np.zeros((3, 3))}, "neither a struct array nor"),
+        ({"a": "text"}, "neither a struct array nor"),
+        ({"a": np.zeros((2, 3, 65))}, "1 to 64 components"),
+        ({"a": np.zeros((2, 3, 6)), "b": np.zeros((3, 3, 6))}, "number of impacts"),
+        ({"impact": {f"f{i}": 1.0 for i in range(101)}}, "100 fields"),
+        ({"impact": {"lin_acc_CG": np.zeros((9, 3)), "t": "word"}}, "no column of numbers"),
+    ],
+)
+def test_a_file_that_holds_no_impacts_says_why(variables: dict[str, Any], said: str):
+    mapping = Mapping.model_validate({"time": {"column": "t", "unit": "s"}}) if "impact" in variables else None
+    problem = refused(mat(variables), preset=PRESET, mapping=mapping)
+    assert problem.slug == "unreadable-file"
+    assert said in problem.detail or codes(problem)[0][1] == "layout-unknown"
+
+
+def test_a_file_that_is_cut_off_is_refused():
+    for data in (mat({"a": noise(2)}), mat({"a": noise(2)}, do_compression=True)):
+        for length in (30, 127, 130, 200, len(data) - 9):
+            assert refused(data[:length], preset=PRESET).status == 422
+    assert "header" in refused(mat({"a": noise(1)})[:126] + b"XX" + b"\0" * 20).detail
