@@ -43,6 +43,14 @@ class TestFilter:
         assert first["id"] in note["detail"]
         assert found(api, quality="duplicate_content") == [second["id"]]
 
+    def test_in_one_import_the_same_content_under_another_name_is_not_stored_again(self, api: Api) -> None:
+        bodies = [impact_body("e-1"), impact_body("e-2"), impact_body("e-3", athlete={"external_id": "p-2"})]
+        file = {"file": ("i.json", json.dumps(bodies), "application/json")}
+        rows = api.post("/v1/imports", files=file).json()["data"]
+        assert [row["status"] for row in rows] == ["created", "unchanged", "created"]
+        assert rows[0]["id"] == rows[1]["id"]
+        assert found(api, quality="duplicate_content") == [rows[2]["id"]]
+
     def test_a_code_that_no_note_can_have_is_422(self, api: Api) -> None:
         answer = api.get("/v1/impacts?quality=A%20B")
         assert (answer.status_code, answer.json()["errors"][0]["parameter"]) == (422, "quality")
