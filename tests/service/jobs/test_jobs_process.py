@@ -91,7 +91,7 @@ def test_a_cancelled_import_keeps_what_it_stored(served: Importer) -> None:
 @pytest.mark.campaign
 def test_an_import_that_is_killed_twenty_times_stores_every_impact_once(importer: Importer) -> None:
     """Prints the moments, for docs/campaigns.md."""
-    random, count = Random(1), 20_000
+    random, count = Random(1), 60_000
     importer.order(ndjson(count))
     moments = []
     for number in range(20):
