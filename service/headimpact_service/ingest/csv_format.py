@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import LineCells
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
@@ -36,7 +37,7 @@ MAX_COLUMNS = 1024
 ROWS_AT_ONCE = 4096
 _DELIMITERS = (",", ";", "\t")
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*")
-Block = tuple[FloatArray, list[list[str]]]
+Block = tuple[FloatArray, Sequence[Sequence[str]]]
 # float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
@@ -122,15 +123,7 @@ class CsvTable:
             return None
         if len(samples) != len(lines):
             return None
-        return samples, [self._cells(lines, index) for index in texts]
-
-    def _cells(self, lines: list[str], index: int) -> list[str]:
-        """One column of text; equal cells, as in the names of impacts, are one string."""
-        cells = [line.split(self._delimiter, index + 1)[index] for line in lines]
-        if index == len(self.headings) - 1:
-            cells = [cell.rstrip("\r\n") for cell in cells]
-        known = dict(zip(cells, cells, strict=True))
-        return list(map(known.__getitem__, cells))
+        return samples, [LineCells(lines, self._delimiter, index) for index in texts]
 
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
         """A block cell by cell, saying what is wrong with it."""

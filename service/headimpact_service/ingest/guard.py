@@ -21,6 +21,7 @@ from contextlib import contextmanager, suppress
 from typing import BinaryIO, NoReturn
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import Words
 from headimpact_service.ingest.guarded.wire import Deadline, Frame, WireError, receive, send
 from headimpact_service.ingest.source import Source
 from headimpact_service.ingest.table import Columns
@@ -324,13 +325,12 @@ def _columns(frame: Frame, numbers: Sequence[int], texts: Sequence[int]) -> Colu
     arrays = list(frame.arrays)
     if [array.size for array in arrays] != [rows] * len(numbers) + [cells] * len(texts):
         raise WireError("malformed")
-    codes = arrays[len(numbers) :]
+    places = arrays[len(numbers) :]
+    if any(at.size and not 0 <= at.min() <= at.max() < len(known) for at, known in zip(places, words, strict=True)):
+        raise WireError("malformed")
     return Columns(
         rows=rows,
         numbers=dict(zip(numbers, arrays, strict=False)),
-        texts={
-            column: [vocabulary[place] for place in places.tolist()]
-            for column, places, vocabulary in zip(texts, codes, words, strict=True)
-        },
+        texts={column: Words(at, known) for column, at, known in zip(texts, places, words, strict=True)},
         lengths=lengths,
     )

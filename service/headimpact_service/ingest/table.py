@@ -22,7 +22,7 @@ class Columns:
 
     rows: int
     numbers: dict[int, FloatArray]
-    texts: dict[int, list[str]]
+    texts: Mapping[int, Sequence[str]]
     lengths: list[int] | None = None
 
 

@@ -198,8 +198,9 @@ class TableImpact:
             yield self.rows
             return
         rows = range(self.rows.start, self.rows.stop) if isinstance(self.rows, slice) else self.rows
-        for _, run in groupby(rows, key=lambda row: cells[row].strip()):
-            part = list(run)
+        texts = cells[self.rows] if isinstance(self.rows, slice) else [cells[row] for row in rows]
+        for _, run in groupby(zip(rows, texts, strict=True), key=lambda pair: pair[1].strip()):
+            part = [row for row, _ in run]
             yield slice(part[0], part[-1] + 1) if part[-1] - part[0] + 1 == len(part) else part
 
     def _track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:

@@ -9,6 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import Stacked
 from headimpact_service.ingest.table import Columns
 
 WINDOW_ROWS = 65_536
@@ -137,7 +138,7 @@ def _stacked(blocks: list[Columns]) -> Columns:
     return Columns(
         rows=sum(block.rows for block in blocks),
         numbers={index: np.concatenate([block.numbers[index] for block in blocks]) for index in blocks[0].numbers},
-        texts={index: [text for block in blocks for text in block.texts[index]] for index in blocks[0].texts},
+        texts={index: Stacked([block.texts[index] for block in blocks]) for index in blocks[0].texts},
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from headimpact_service.ingest.cells import Words
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
 from headimpact_service.ingest.table import Columns, FloatArray
 
@@ -73,14 +74,14 @@ def floats(column: pa.Array) -> FloatArray:
     return np.ascontiguousarray(cast.to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
-def words(column: pa.Array) -> list[str]:
+def words(column: pa.Array) -> Words:
     """A column as text: names and numbers as they are, times as RFC 3339 has them; empty where a cell is."""
     if pa.types.is_nested(column.type):
         raise unreadable(_NO_TEXT)
     encoded = column if isinstance(column, pa.DictionaryArray) else column.dictionary_encode()
     known = [checked_text(text) for text in _texts(encoded.dictionary)] + [""]
-    codes = pc.fill_null(encoded.indices.cast(pa.int64()), len(known) - 1).to_numpy(zero_copy_only=False)
-    return [known[code] for code in codes.tolist()]
+    places = pc.fill_null(encoded.indices.cast(pa.int32()), len(known) - 1).to_numpy(zero_copy_only=False)
+    return Words(places, known)
 
 
 def _texts(values: pa.Array) -> list[str]:

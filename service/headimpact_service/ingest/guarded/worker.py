@@ -17,6 +17,7 @@ from importlib import import_module
 import numpy as np
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import Words
 from headimpact_service.ingest.guarded import limits
 from headimpact_service.ingest.guarded.contents import Content, Lines, NamedTable
 from headimpact_service.ingest.guarded.wire import Array, Deadline, Frame, WireError, receive, send
@@ -122,14 +123,10 @@ def _offer(connection: socket.socket, content: NamedTable) -> bool:
 def _block(block: Columns) -> Frame:
     """Numbers as they are; texts as places in a list of what occurs, as names of impacts repeat row by row."""
     numbers: list[Array] = [np.asarray(values, "<f8") for values in block.numbers.values()]
-    codes: list[Array] = []
-    words: list[list[str]] = []
-    for cells in block.texts.values():
-        places = {text: place for place, text in enumerate(dict.fromkeys(cells))}
-        codes.append(np.fromiter((places[text] for text in cells), "<i4", len(cells)))
-        words.append(list(places))
-    fields = {"rows": block.rows, "lengths": block.lengths, "words": words}
-    return Frame("block", fields, [*numbers, *codes])
+    texts = [Words.of(cells) for cells in block.texts.values()]
+    places: list[Array] = [np.asarray(words.places, "<i4") for words in texts]
+    fields = {"rows": block.rows, "lengths": block.lengths, "words": [list(words.known) for words in texts]}
+    return Frame("block", fields, [*numbers, *places])
 
 
 def _send_lines(connection: socket.socket, lines: Lines) -> None:

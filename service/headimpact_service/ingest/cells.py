@@ -1,0 +1,105 @@
+"""Columns of text: cells that are looked up when they are asked for, as most of them never are.
+
+What a table says of an impact stands in each of its rows and is read from the first.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from itertools import accumulate, chain
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Words(Sequence[str]):
+    """Cells as places in a list of the words that occur."""
+
+    def __init__(self, places: NDArray[Any], known: Sequence[str]) -> None:
+        """`known[places[row]]` is the cell of a row."""
+        self.places, self.known = places, known
+
+    def __len__(self) -> int:
+        """Rows."""
+        return int(self.places.size)
+
+    @overload
+    def __getitem__(self, row: int) -> str: ...
+    @overload
+    def __getitem__(self, row: slice) -> Sequence[str]: ...
+    def __getitem__(self, row: int | slice) -> str | Sequence[str]:
+        """A cell, or some rows."""
+        return Words(self.places[row], self.known) if isinstance(row, slice) else self.known[self.places[row]]
+
+    def __iter__(self) -> Iterator[str]:
+        """Cell by cell."""
+        return map(self.known.__getitem__, self.places.tolist())
+
+    @classmethod
+    def of(cls, cells: Sequence[str]) -> Words:
+        """Any cells, as words."""
+        if isinstance(cells, cls):
+            return cells
+        known = {text: place for place, text in enumerate(dict.fromkeys(cells))}
+        return cls(np.fromiter(map(known.__getitem__, cells), np.int32, len(cells)), list(known))
+
+
+class LineCells(Sequence[str]):
+    """One column of lines whose cells no separator and no quote stands in."""
+
+    def __init__(self, lines: Sequence[str], delimiter: str, column: int) -> None:
+        """Nothing is split yet."""
+        self._lines, self._delimiter, self._column = lines, delimiter, column
+
+    def __len__(self) -> int:
+        """Rows."""
+        return len(self._lines)
+
+    @overload
+    def __getitem__(self, row: int) -> str: ...
+    @overload
+    def __getitem__(self, row: slice) -> Sequence[str]: ...
+    def __getitem__(self, row: int | slice) -> str | Sequence[str]:
+        """A cell, or some rows."""
+        if isinstance(row, slice):
+            return LineCells(self._lines[row], self._delimiter, self._column)
+        return self._lines[row].split(self._delimiter, self._column + 1)[self._column].rstrip("\r\n")
+
+    def __iter__(self) -> Iterator[str]:
+        """Cell by cell; only the last of a line has its end."""
+        delimiter, column = self._delimiter, self._column
+        if self._lines and self._lines[0].count(delimiter) == column:
+            return (line.rsplit(delimiter, 1)[-1].rstrip("\r\n") for line in self._lines)
+        return iter([line.split(delimiter, column + 1)[column] for line in self._lines])
+
+
+class Stacked(Sequence[str]):
+    """Columns of several blocks, end to end."""
+
+    def __init__(self, parts: Sequence[Sequence[str]]) -> None:
+        """The blocks' columns in order."""
+        self._parts = parts
+        self._starts = [0, *accumulate(map(len, parts))]
+
+    def __len__(self) -> int:
+        """Rows."""
+        return self._starts[-1]
+
+    @overload
+    def __getitem__(self, row: int) -> str: ...
+    @overload
+    def __getitem__(self, row: slice) -> Sequence[str]: ...
+    def __getitem__(self, row: int | slice) -> str | Sequence[str]:
+        """A cell, or some rows that follow each other."""
+        if isinstance(row, int):
+            part = bisect_right(self._starts, row) - 1
+            return self._parts[part][row - self._starts[part]]
+        start, stop, _ = row.indices(len(self))
+        pairs = zip(self._parts, self._starts, strict=False)
+        return Stacked([part[max(start - at, 0) : max(stop - at, 0)] for part, at in pairs if at < stop])
+
+    def __iter__(self) -> Iterator[str]:
+        """Cell by cell."""
+        return chain.from_iterable(self._parts)

@@ -1,0 +1,52 @@
+"""Columns of text that are looked up when they are asked for are the lists that they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from headimpact_service.ingest.cells import LineCells, Stacked, Words
+
+cells = st.lists(st.sampled_from(["", "a", "b", "Ω"]), max_size=12)
+
+
+def forms(texts: list[str]) -> list[Sequence[str]]:
+    """The same cells in every form, the last column of a line and another one."""
+    lines = [f"x;{text};y\n" for text in texts]
+    ends = [f"x;{text}\r\n" for text in texts]
+    half = len(texts) // 2
+    return [
+        Words.of(texts),
+        LineCells(lines, ";", 1),
+        LineCells(ends, ";", 1),
+        Stacked([texts[:half], Words.of(texts[half:])]),
+        Stacked([LineCells(lines[:half], ";", 1), [], LineCells(lines[half:], ";", 1)]),
+    ]
+
+
+@given(texts=cells, start=st.integers(0, 12), count=st.integers(0, 12))
+def test_every_form_has_the_cells_of_its_list(texts: list[str], start: int, count: int):
+    for form in forms(texts):
+        assert len(form) == len(texts)
+        assert list(form) == texts
+        assert [form[row] for row in range(len(texts))] == texts
+        part = form[start : start + count]
+        assert list(part) == texts[start : start + count]
+        assert [part[row] for row in range(len(part))] == texts[start : start + count]
+
+
+def test_words_are_kept_once():
+    words = Words.of(["a", "b", "a", "a"])
+    np.testing.assert_array_equal(words.places, [0, 1, 0, 0])
+    assert words.known == ["a", "b"]
+    assert Words.of(words) is words
+
+
+def test_a_row_that_is_not_there_is_an_error():
+    for form in forms(["a"])[:3]:
+        with pytest.raises(IndexError):
+            form[1]
