@@ -131,6 +131,27 @@ def test_the_length_is_bounded():
     assert refused(head).status == 422
 
 
+@pytest.mark.parametrize(
+    "file",
+    [
+        dts().replace("30.0", '"30.0', 1),
+        dts() + "\0,1,2,3,4,5,6\r\n",
+        dts() + "1" * 300_000,
+        dts(time_column=False) + "1,2,3,4,5,6,7,8\r\n",
+        dts(changes={"ISO Channel Code": []}),
+        "Sample Rate (Hz),1\nISO Channel Code,x\n" + "word,1\n" * 300,
+    ],
+    ids=["quotes", "NUL", "line", "cells", "no codes", "no samples"],
+)
+def test_a_broken_file_is_refused(file):
+    assert refused(file, preset="dts").status in {415, 422}
+
+
+def test_more_heads_than_an_import_may_hold_are_413():
+    columns = DTS_COLUMNS | {"13" + code[2:]: pair for code, pair in DTS_COLUMNS.items()}
+    assert statuses(outcome(dts(columns), max_impacts=1)) == {413}
+
+
 @given(st.dictionaries(st.integers(0, 3000), st.binary(max_size=4), min_size=1, max_size=6))
 @settings(max_examples=80, deadline=None)
 def test_any_damage_is_read_or_refused(damage):

@@ -300,6 +300,48 @@ def test_any_damage_to_a_channel_is_read_or_refused(damage, which):
     assert statuses(outcome(iso_mme(damaged, encoding="latin-1"))) <= {413, 415, 422}
 
 
+class TestTogether:
+    """Channels that do not fit together."""
+
+    @pytest.mark.parametrize(
+        ("changes", "code"),
+        [
+            ({"sampling_interval": 0.002}, "rates-differ"),
+            ({"time_of_first_sample": 5.0}, "no-overlap"),
+        ],
+    )
+    def test_the_axes_of_one_signal_must_share_rate_and_time(self, changes, code):
+        assert codes(refused(changed(**changes))) == [(None, code)]
+
+    def test_signals_of_unlike_rates_that_begin_together_keep_their_rates(self):
+        slow = {code: pair for code, pair in ISO_CODES.items() if "AV" in code}
+        record = one(iso_mme(channels() | channels(slow, sampling_interval=0.0005)))
+        assert record.recording.linear_acceleration.sample_rate_hz == 1000.0
+        assert record.recording.angular_velocity.sample_rate_hz == 2000.0
+        assert record.recording.pre_trigger_ms == 10.0
+
+    def test_signals_of_unlike_rates_that_begin_apart_keep_their_times(self):
+        late = {code: pair for code, pair in ISO_CODES.items() if "AV" in code}
+        record = one(iso_mme(channels() | channels(late, sampling_interval=0.0005, time_of_first_sample=0.0)))
+        a, w = record.recording.linear_acceleration, record.recording.angular_velocity
+        assert w.time_s[0] - a.time_s[0] == pytest.approx(0.01)
+        assert prepare(record.recording).kinematics.time_ms(0) == pytest.approx(0.0, abs=1e-9)
+
+    def test_channels_that_begin_later_are_cut_to_what_all_share(self):
+        record = one(changed(time_of_first_sample=-0.005))
+        assert record.recording.angular_velocity.values.shape[0] == SAMPLES - 5
+        assert record.recording.pre_trigger_ms == 5.0
+
+    def test_a_resultant_alone_is_no_head(self):
+        code = "11HEADCG00H3ACRA"
+        assert codes(refused(iso_mme({code: channel(code, "g", [0.0, 1.0, 0.0])}))) == [(None, "no-signal")]
+
+    def test_more_heads_than_an_import_may_hold_are_413(self):
+        passenger = {"13" + code[2:]: pair for code, pair in ISO_CODES.items()}
+        items = outcome(iso_mme(channels() | channels(passenger)), max_impacts=1)
+        assert statuses(items) == {413}
+
+
 @needs_recordings
 def test_the_public_fixture_is_read_its_absent_channel_named_and_why_it_has_no_score():
     folder = RECORDINGS / "iso_mme_fixture"

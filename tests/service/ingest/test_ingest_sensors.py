@@ -93,6 +93,14 @@ class TestOwnTimes:
         assert codes(refused(table(SIX, six_axis().tolist()), mapping=own)) == [("sample_rate_hz", "rate-missing")]
 
 
+class TestDroppedSamples:
+    def test_the_time_before_the_trigger_is_shortened_by_a_rate_as_by_times(self):
+        dropped = mapping(sample_rate_hz=2000, drop_rows=3, pre_trigger_ms=10)
+        assert one(table(SIX, six_axis().tolist()), mapping=dropped).recording.pre_trigger_ms == 8.5
+        none_left = mapping(sample_rate_hz=2000, drop_rows=3, pre_trigger_ms=1)
+        assert one(table(SIX, six_axis().tolist()), mapping=none_left).recording.pre_trigger_ms == 0.0
+
+
 class TestMounting:
     def test_each_sensor_s_rotation_and_delay_come_with_a_mapping(self):
         turned = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
