@@ -126,7 +126,7 @@ WAYS: list[tuple[str, str, Way]] = [
         ),
     ),
     (
-        "invalid-payload",
+        "not-found",
         "an unknown athlete",
         lambda api: api.post("/v1/impacts", json=impact_body(athlete={"id": SECRET})),
     ),
