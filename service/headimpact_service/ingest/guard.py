@@ -120,7 +120,9 @@ class GuardedTable:
         """The asked-for columns, block by block."""
         self._reading.want(numbers, texts)
         while (frame := self._reading.next()).kind == "block":
-            yield _columns(frame, numbers, texts)
+            with _well_formed():
+                columns = _columns(frame, numbers, texts)
+            yield columns
 
 
 class GuardedLines:
@@ -160,7 +162,9 @@ class Reading:
                 yield GuardedLines(self)
                 continue
             self._offered = True
-            yield GuardedTable(self, frame)
+            with _well_formed():
+                table = GuardedTable(self, frame)
+            yield table
             if self._offered:
                 self._offered = False
                 send(self._worker.connection, Frame("skip"))
@@ -188,7 +192,9 @@ class Reading:
             self._open = False
         if frame.kind == "refused":
             self._rest()
-            raise Problem(str(frame.fields["slug"]), str(frame.fields["detail"]))
+            with _well_formed():
+                problem = Problem(frame.fields["slug"], str(frame.fields["detail"]))
+            raise problem
         if frame.kind == "exhausted":
             _refuse_excess()
         if frame.kind == "broken":
@@ -224,6 +230,15 @@ def guarded(kind: str, source: Source) -> Iterator[Iterator[GuardedTable | Guard
         finally:
             reading.stop()
             _POOL.give_back(worker, stays=reading.worker_stays)
+
+
+@contextmanager
+def _well_formed() -> Iterator[None]:
+    """A process that a file has taken over may send what it likes: what is not of the agreed form ends it."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
+        raise WireError("malformed") from None
 
 
 def _refuse_excess() -> NoReturn:
@@ -320,8 +335,10 @@ def _environment() -> dict[str, str]:
 
 def _columns(frame: Frame, numbers: Sequence[int], texts: Sequence[int]) -> Columns:
     """A block as it was sent, checked against what was asked for."""
-    rows, lengths, words = frame.fields["rows"], frame.fields["lengths"], frame.fields["words"]
+    rows, lengths, words = int(frame.fields["rows"]), frame.fields["lengths"], frame.fields["words"]
     cells = rows if lengths is None else len(lengths)
+    if lengths is not None and (sum(lengths) != rows or min(lengths, default=0) < 0):
+        raise WireError("malformed")
     arrays = list(frame.arrays)
     if [array.size for array in arrays] != [rows] * len(numbers) + [cells] * len(texts):
         raise WireError("malformed")
@@ -331,6 +348,6 @@ def _columns(frame: Frame, numbers: Sequence[int], texts: Sequence[int]) -> Colu
     return Columns(
         rows=rows,
         numbers=dict(zip(numbers, arrays, strict=False)),
-        texts={column: Words(at, known) for column, at, known in zip(texts, places, words, strict=True)},
+        texts={column: Words(at, list(map(str, known))) for column, at, known in zip(texts, places, words, strict=True)},
         lengths=lengths,
     )
