@@ -348,6 +348,8 @@ def _columns(frame: Frame, numbers: Sequence[int], texts: Sequence[int]) -> Colu
     return Columns(
         rows=rows,
         numbers=dict(zip(numbers, arrays, strict=False)),
-        texts={column: Words(at, list(map(str, known))) for column, at, known in zip(texts, places, words, strict=True)},
+        texts={
+            column: Words(at, list(map(str, known))) for column, at, known in zip(texts, places, words, strict=True)
+        },
         lengths=lengths,
     )

@@ -109,7 +109,7 @@ def hostile(secret: Path) -> Iterator[tuple[str, bytes]]:
     yield "long_text.parquet", parquet(pa.table({"kinematics_x": ["x" * 1_000_000] * 100, "ax_g": np.zeros(100)}))
     long_names = {"external_id": ["x" * 1_000_000] * 150, **dict.fromkeys(("t_ms", *COLUMNS), np.zeros(150))}
     yield "long_names.parquet", parquet(pa.table(long_names), compression="zstd", use_dictionary=False)
-    yield "columns.parquet", parquet(pa.table({f"c{i}": [0.0] for i in range(20_000)}))
+    yield "columns.parquet", parquet(pa.table({f"c{i}": [0.0] for i in range(30_000)}))
     yield "huge_footer.parquet", b"PAR1" + b"\0" * 100 + (2**31 - 1).to_bytes(4, "little") + b"PAR1"
     zeros = pa.table(dict.fromkeys(("t_ms", *COLUMNS[:3]), np.zeros(8_000_000)))
     yield "batch.arrow", arrow(zeros, compression="zstd")
