@@ -35,9 +35,11 @@ def main(handle: int) -> None:
 
 
 def _last_word(conn: Connection, task: str, arguments: dict[str, Any]) -> tuple[str, Any]:
-    """Send everything that the task yields; how it ended."""
+    """Say that work begins, send everything that the task yields; how it ended."""
     try:
-        for value in _load(task)(arguments):
+        loaded = _load(task)
+        conn.send(("begins", None))
+        for value in loaded(arguments):
             conn.send(("value", value))
     except Problem as problem:
         return "problem", problem

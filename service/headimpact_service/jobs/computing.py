@@ -27,12 +27,17 @@ class ChildFaultError(RuntimeError):
 
 @contextmanager
 def computing(
-    task: str, arguments: Mapping[str, Any], *, memory: int, check: Callable[[], None]
+    task: str,
+    arguments: Mapping[str, Any],
+    *,
+    memory: int,
+    check: Callable[[], None],
+    begins: Callable[[], None] = lambda: None,
 ) -> Iterator[Iterator[Any]]:
     """What `task` (`module:function`) yields in a child process, as it comes; the child is ended with the block.
 
     A started process costs a second, and is then free of this one's lock and memory. `check` is called while
-    waiting, and may raise.
+    waiting, and may raise; `begins` once the child has started and is about to work.
     """
     ours, theirs = multiprocessing.Pipe()
     command = [sys.executable, "-m", "headimpact_service.jobs.child", str(theirs.fileno())]
@@ -47,14 +52,14 @@ def computing(
     try:
         theirs.close()
         ours.send((task, dict(arguments), memory))
-        yield _values(ours, check)
+        yield _values(ours, check, begins)
     finally:
         child.kill()
         child.wait()
         ours.close()
 
 
-def _values(conn: Connection, check: Callable[[], None]) -> Iterator[Any]:
+def _values(conn: Connection, check: Callable[[], None], begins: Callable[[], None]) -> Iterator[Any]:
     while True:
         while not conn.poll(LOOK_AGAIN_S):
             check()
@@ -64,6 +69,9 @@ def _values(conn: Connection, check: Callable[[], None]) -> Iterator[Any]:
             raise ChildDiedError from None
         if word == "end":
             return
+        if word == "begins":
+            begins()
+            continue
         if word == "problem":
             raise value
         if word == "fault":

@@ -88,7 +88,14 @@ class Work:
         with house.database.read() as conn:
             self.outcomes = job_runs.outcomes(conn, job.id)
             """What the parts that are committed came to; their number is that of the first that is not."""
+        self.risked = False
         self._looked = -LOOK_S
+
+    def risk(self) -> None:
+        """Count this run as a crash until it ends or gets on: from here on it may be the job that ends the process."""
+        if not self.risked:
+            self.house.database.write(lambda conn: job_runs.risk(conn, self.job.id, self.job.run))
+            self.risked = True
 
     def expect(self, total: int) -> None:
         """Say how many parts progress is counted in."""
@@ -115,8 +122,8 @@ class Work:
         self.outcomes.extend(outcomes[-1:])
 
     def computing(self, task: str, arguments: Mapping[str, Any]) -> AbstractContextManager[Iterator[Any]]:
-        """What `task` yields in a child process."""
-        return computing(task, arguments, memory=self.house.memory, check=self.check)
+        """What `task` yields in a child process. Until that has started, the job is not to blame for an end."""
+        return computing(task, arguments, memory=self.house.memory, check=self.check, begins=self.risk)
 
     def check(self) -> None:
         """Raise if this run is to stop."""
@@ -143,24 +150,24 @@ def run(house: House, kinds: Mapping[str, Kind], job_id: bytes, number: int) -> 
         return
     kind = kinds[job.kind]
     if job.crashes >= MAX_CRASHES:
-        _end(house, kind, job, "cancelled", _crashed(job))
+        _end(house, kind, job, "cancelled", _crashed)
         return
+    work = Work(house, job)
     try:
-        work = Work(house, job)
         work.check()
         kind.run(work)
     except SupersededError:
         return
     except ShutdownError:
-        house.database.write(lambda conn: job_runs.hand_back(conn, job.id, job.run, crashed=False))
+        _hand_back(work, crashes=-1 if work.risked else 0)
     except CancelledError:
         _end(house, kind, job, "cancelled", _cancelled)
     except ChildDiedError:
         logger.warning("A job's process died.", extra={"job": ids.encode("job", job.id)})
-        _again(house, job)
+        _again(work)
     except Problem as problem:
         if problem.slug == "unavailable":
-            _again(house, job)
+            _again(work)
         else:
             _end(house, kind, job, "failed", problem)
     except Exception:
@@ -171,10 +178,17 @@ def run(house: House, kinds: Mapping[str, Kind], job_id: bytes, number: int) -> 
         _end(house, kind, job, "succeeded", None)
 
 
-def _again(house: House, job: Job) -> None:
+def _again(work: Work) -> None:
     """Another run, after a pause that doubles each time."""
-    later = datetime.now(UTC) + timedelta(seconds=2.0 ** (job.crashes + 1))
-    house.database.write(lambda conn: job_runs.hand_back(conn, job.id, job.run, crashed=True, not_before=later))
+    later = datetime.now(UTC) + timedelta(seconds=2.0 ** (work.job.crashes + 1))
+    _hand_back(work, crashes=0 if work.risked else 1, not_before=later)
+
+
+def _hand_back(work: Work, *, crashes: int, not_before: datetime | None = None) -> None:
+    job = work.job
+    work.house.database.write(
+        lambda conn: job_runs.hand_back(conn, job.id, job.run, crashes=crashes, not_before=not_before)
+    )
 
 
 Ending = Problem | Callable[[Job], Problem] | None

@@ -39,16 +39,21 @@ def get(conn: Connection, job_id: bytes) -> Job | None:
 
 
 def begin(conn: Connection, job_id: bytes, run: int) -> Job | None:
-    """Take a run up, counted as a crash until it ends or gets on; None if the job has ended or is in another run."""
+    """Take a run up; None if the job has ended or is in another run."""
     found = _of_run(conn, job_id, run)
     if found is None:
         return None
     now = datetime.now(UTC)
-    changes = {"crashes": found.crashes + 1, "started_at": found.started_at or now}
-    if found.state == "queued":
-        changes["state"] = "running"
-    _change(conn, job_id, now, changes)
+    state = "running" if found.state == "queued" else found.state
+    _change(conn, job_id, now, {"state": state, "started_at": found.started_at or now})
     return found
+
+
+def risk(conn: Connection, job_id: bytes, run: int) -> None:
+    """Count this run as a crash until it ends or gets on."""
+    found = _of_run(conn, job_id, run)
+    if found is not None:
+        _change(conn, job_id, datetime.now(UTC), {"crashes": found.crashes + 1})
 
 
 def expect(conn: Connection, job_id: bytes, run: int, total: int) -> None:
@@ -105,16 +110,14 @@ def finish(
     return True
 
 
-def hand_back(conn: Connection, job_id: bytes, run: int, *, crashed: bool, not_before: datetime | None = None) -> bool:
-    """Let another run take the job up; with `crashed` this one stays counted. False if the job is not in this run."""
+def hand_back(conn: Connection, job_id: bytes, run: int, *, crashes: int, not_before: datetime | None = None) -> bool:
+    """Let another run take the job up; `crashes` is added to their count. False if the job is not in this run."""
     found = _of_run(conn, job_id, run)
     if found is None:
         return False
-    changes: dict[str, Any] = {"run": run + 1, "not_before": not_before}
+    changes: dict[str, Any] = {"run": run + 1, "not_before": not_before, "crashes": found.crashes + crashes}
     if found.state == "running":
         changes["state"] = "queued"
-    if not crashed:
-        changes["crashes"] = max(0, found.crashes - 1)
     _change(conn, job_id, datetime.now(UTC), changes)
     return True
 

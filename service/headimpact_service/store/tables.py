@@ -227,7 +227,7 @@ jobs = Table(
     Column("state", String(16), nullable=False),
     # A run is one attempt of one process; its number keeps an older run, still alive somewhere, from writing.
     Column("run", Integer, nullable=False),
-    # Runs that began and did not end, since the job last got on.
+    # Runs that got to work and did not end, since the job last got on.
     Column("crashes", Integer, nullable=False),
     Column("not_before", Instant),
     Column("done", Integer, nullable=False),

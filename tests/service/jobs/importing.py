@@ -95,5 +95,9 @@ class Importer:
         return [name for name in impacts if name.startswith(f"{prefix}-")]
 
     def uploads(self) -> list[str]:
-        """What lies in the folder of uploads."""
-        return [path.name for path in (self.folder / "headimpact.db-jobs" / "uploads").iterdir()]
+        """What lies in the folder of uploads, once a job that has just ended had its moment to clean up."""
+        folder = self.folder / "headimpact.db-jobs" / "uploads"
+        deadline = time.monotonic() + PATIENCE_S
+        while (names := [path.name for path in folder.iterdir()]) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        return names

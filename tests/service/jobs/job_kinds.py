@@ -25,6 +25,7 @@ class Counting:
         self.cleaned: list[bytes] = []
 
     def run(self, work: Work) -> None:
+        work.risk()
         work.expect(self.parts * 10)
         for number in range(len(work.outcomes), self.parts):
             self.before(number, work)

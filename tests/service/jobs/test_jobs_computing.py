@@ -45,6 +45,16 @@ def test_what_the_task_yields_arrives_in_order() -> None:
     assert compute("count", n=5) == [0, 1, 2, 3, 4]
 
 
+def test_it_is_said_when_the_work_begins() -> None:
+    said: list[str] = []
+    with computing(
+        "job_kinds:count", {"n": 1}, memory=MEMORY, check=nothing, begins=lambda: said.append("so")
+    ) as values:
+        assert (list(values), said) == ([0], ["so"])
+    with pytest.raises(ChildFaultError), computing("job_kinds:none", {}, memory=MEMORY, check=nothing) as values:
+        next(values)
+
+
 def test_a_problem_in_the_child_is_the_same_problem_here() -> None:
     with pytest.raises(Problem) as raised:
         compute("refuse")

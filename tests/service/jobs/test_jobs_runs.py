@@ -95,6 +95,16 @@ class TestDeath:
         assert pauses == [2, 4, 8]
         assert attempt(house, job, Counting()).state == "cancelled"
 
+    def test_a_run_that_ended_before_it_got_to_work_is_not_the_job_s_fault(self, house: House, job: Job) -> None:
+        def end(_: Work) -> None:
+            raise Killed
+
+        kind = Counting()
+        kind.run = end  # type: ignore[method-assign]
+        for _ in range(MAX_CRASHES + 1):
+            crash(house, job, kind)
+        assert attempt(house, job, Counting()).state == "succeeded"
+
     def test_a_run_that_another_process_has_taken_over_stops_without_a_trace(self, house: House, job: Job) -> None:
         other = Counting()
 

@@ -89,7 +89,7 @@ class TestParts:
 
     def test_an_older_run_changes_nothing(self, database: Database, job: Job) -> None:
         begun(database, job)
-        database.write(lambda conn: job_runs.hand_back(conn, job.id, 1, crashed=True))
+        database.write(lambda conn: job_runs.hand_back(conn, job.id, 1, crashes=0))
         written: list[int] = []
         assert committed(database, job, 0, written, run=1) == "superseded"
         assert not database.write(lambda conn: job_runs.finish(conn, job.id, 1, "succeeded", result={}))
@@ -97,15 +97,17 @@ class TestParts:
         assert (written, read(database, job).state) == ([], "queued")
 
     def test_crashes_are_counted_until_the_job_gets_on(self, database: Database, job: Job) -> None:
+        begun(database, job)
         for _ in range(2):
-            begun(database, job)
+            database.write(lambda conn: job_runs.risk(conn, job.id, 1))
         assert read(database, job).crashes == 2
         committed(database, job, 0, [])
         assert read(database, job).crashes == 1
 
     def test_a_run_that_is_handed_back_in_peace_is_no_crash(self, database: Database, job: Job) -> None:
         begun(database, job)
-        database.write(lambda conn: job_runs.hand_back(conn, job.id, 1, crashed=False))
+        database.write(lambda conn: job_runs.risk(conn, job.id, 1))
+        database.write(lambda conn: job_runs.hand_back(conn, job.id, 1, crashes=-1))
         assert (read(database, job).crashes, read(database, job).run) == (0, 2)
 
 
