@@ -54,9 +54,10 @@ def test_a_lock_names_no_index_and_no_address(lock: str) -> None:
     ("lock", "needed"),
     [
         ("requirements.lock", PYPROJECT["project"]["dependencies"]),
+        ("requirements.lock", PYPROJECT["project"]["optional-dependencies"]["files"]),
         ("requirements-build.lock", PYPROJECT["build-system"]["requires"]),
     ],
-    ids=LOCKS,
+    ids=["service", "files", "build"],
 )
 def test_a_lock_holds_what_the_project_needs_in_a_version_that_it_takes(lock: str, needed: list[str]) -> None:
     pins = {canonicalize_name(pin.name): pin for pin in locked(lock) if pin.marker is None or pin.marker.evaluate()}

@@ -82,7 +82,8 @@ def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
     values = np.zeros((columns.rows, 3))
     for axis, component in enumerate(signal.components):
         if component.column is not None:
-            np.multiply(columns.numbers[component.column], component.sign, out=values[:, axis])
+            with np.errstate(invalid="ignore"):  # a binary file may hold NaNs that signal
+                np.multiply(columns.numbers[component.column], component.sign, out=values[:, axis])
     return values
 
 
