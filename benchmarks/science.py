@@ -8,19 +8,21 @@ Ratios are the peer's process CPU time over ours, the median over rounds in turn
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import straightforward
 from alternate import Comparison, compare
 from dynars import injury
 from eqsig.sdof import nigam_and_jennings_response
-from waves import fresh, impact
+from waves import block, fresh, impact
 
 from headimpact.brain import BRAIN, peak_brain_angles
 from headimpact.criteria import CRITERIA, evaluate
 from headimpact.criteria.windows import window_maxima
 from headimpact.kinematics import HeadKinematics
-from headimpact.preparation import Preparation
+from headimpact.preparation import BLOCK, Preparation, prepare, prepare_many
+from headimpact.recording import Recording, Signal
 from headimpact.risk import LAKSARI_2020
 from headimpact.scoring import score, score_many
 
@@ -60,29 +62,32 @@ def impacts_scaled(found: Comparison, factor: float) -> Comparison:
 
 def hic_batch() -> Comparison:
     """HIC15 and HIC36 of 1000 impacts of 100 samples at 1 kHz."""
-    resultants = np.stack([impact(seed).linear_acceleration_resultant_g for seed in range(1000)], axis=1)
+    resultants = np.stack([resultant(impact(seed)) for seed in range(1000)], axis=1)
     rows = [np.ascontiguousarray(column) for column in resultants.T]
 
     def peer():
         return [(injury.hic15(row, 1 / RATE), injury.hic36(row, 1 / RATE)) for row in rows]
 
-    (hic15, _, _), (hic36, _, _) = window_maxima(resultants, RATE, (0.015, 0.036))
-    np.testing.assert_allclose(
-        np.stack([hic15, hic36], axis=1), [[_value(x) for x in pair] for pair in peer()], rtol=1e-9
-    )
+    found = window_maxima(resultants, RATE, (0.015, 0.036)).value
+    np.testing.assert_allclose(found.T, [[_value(x) for x in pair] for pair in peer()], rtol=1e-9)
     return compare(lambda: window_maxima(resultants, RATE, (0.015, 0.036)), peer, calls=(3, 3))
 
 
 def hic_high_rate() -> Comparison:
     """HIC15 and HIC36 of one record of 2000 samples at 20 kHz."""
-    resultant = impact(3, 2000, 20_000.0).linear_acceleration_resultant_g
+    record = resultant(impact(3, 2000, 20_000.0))
+    column = record[:, None]
 
     def peer():
-        return injury.hic15(resultant, 1 / 20_000), injury.hic36(resultant, 1 / 20_000)
+        return injury.hic15(record, 1 / 20_000), injury.hic36(record, 1 / 20_000)
 
-    found = [value for value, _, _ in window_maxima(resultant, 20_000.0, (0.015, 0.036))]
+    found = window_maxima(column, 20_000.0, (0.015, 0.036)).value[:, 0]
     np.testing.assert_allclose(found, [_value(x) for x in peer()], rtol=1e-9)
-    return compare(lambda: window_maxima(resultant, 20_000.0, (0.015, 0.036)), peer, calls=(50, 20))
+    return compare(lambda: window_maxima(column, 20_000.0, (0.015, 0.036)), peer, calls=(50, 20))
+
+
+def resultant(k: HeadKinematics) -> np.ndarray:
+    return np.linalg.norm(k.linear_acceleration_g, axis=1)
 
 
 def _value(found: object) -> float:
@@ -92,7 +97,7 @@ def _value(found: object) -> float:
 
 def prepared(k: HeadKinematics) -> Preparation:
     """Kinematics as the preparation of a recording leaves them."""
-    return Preparation(fresh(k), (), (), "supplied", "five_point_stencil", pre_trigger_known=False)
+    return Preparation(fresh(k.motion), (), (), "supplied", "five_point_stencil", pre_trigger_known=False)
 
 
 def one_impact(angles: Callable[..., np.ndarray], agreement: float) -> Comparison:
@@ -113,26 +118,34 @@ def batch() -> tuple[float, float]:
     """Impacts per CPU second in batch: values and probabilities as arrays, and whole score objects."""
     impacts = [impact(seed) for seed in range(1024)]
     b0, b = LAKSARI_2020.coefficients
-    blocks = [
-        HeadKinematics(
-            RATE,
-            *(
-                np.stack([getattr(k, name) for k in impacts[i : i + 256]], axis=2)
-                for name in ("linear_acceleration_g", "angular_velocity", "angular_acceleration")
-            ),
-        )
-        for i in range(0, len(impacts), 256)
-    ]
+    blocks = [block(impacts[i : i + BLOCK]) for i in range(0, len(impacts), BLOCK)]
 
     def arrays():
-        for block in blocks:
-            values = evaluate(fresh(block)).values
+        for motion in blocks:
+            values = evaluate(fresh(motion)).values
             for row, criterion in enumerate(CRITERIA):
-                found = values[criterion.key].reshape(-1, 256)
+                found = values[criterion.key].reshape(-1, BLOCK)
                 1 / (1 + np.exp(b0[row] + b[row, : len(found)] @ found))
 
-    both = compare(arrays, lambda: score_many([prepared(k) for k in impacts]), calls=(1, 1))
+    def objects():
+        for motion in blocks:
+            one = Preparation(fresh(motion), (), (), "supplied", "five_point_stencil", pre_trigger_known=False)
+            score_many([replace(one, place=place) for place in range(BLOCK)])
+
+    both = compare(arrays, objects, calls=(1, 1))
     return len(impacts) / both.ours, len(impacts) / both.peer
+
+
+def recordings() -> tuple[float, float]:
+    """Recordings per CPU second: prepared and scored together, and one by one."""
+    sent = [
+        Recording(Signal(k.linear_acceleration_g, "g", RATE), Signal(k.angular_velocity, "rad/s", RATE))
+        for k in map(impact, range(512))
+    ]
+    both = compare(
+        lambda: score_many(prepare_many(sent)), lambda: [score(prepare(one)) for one in sent], calls=(1, 1), rounds=5
+    )
+    return len(sent) / both.ours, len(sent) / both.peer
 
 
 def main() -> None:
@@ -147,6 +160,8 @@ def main() -> None:
     print(integrated.row(name, "SciPy code with solve_ivp", "30"), flush=True)
     arrays, objects = batch()
     print(f"\nIn batch: {arrays:,.0f} impacts per CPU second as arrays, {objects:,.0f} as score objects.")
+    together, alone = recordings()
+    print(f"From recordings as sent: {together:,.0f} per CPU second together, {alone:,.0f} one by one.")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from headimpact.kinematics import HeadKinematics, differentiate
+from headimpact.kinematics import HeadKinematics, Motion, differentiate
 
 
 def impact(seed: int, samples: int = 100, rate: float = 1000.0) -> HeadKinematics:
@@ -15,10 +15,16 @@ def impact(seed: int, samples: int = 100, rate: float = 1000.0) -> HeadKinematic
     swing = np.cumsum(pulse, axis=0) / pulse.sum()
     a = pulse * rng.uniform(-50, 50, 3) + rng.normal(0, 0.5, (samples, 3))
     w = swing * rng.uniform(-20, 20, 3) + rng.normal(0, 0.02, (samples, 3))
-    a, w = np.asfortranarray(a), np.asfortranarray(w)
     return HeadKinematics(rate, a, w, differentiate(w, rate))
 
 
-def fresh(k: HeadKinematics) -> HeadKinematics:
+def block(impacts: list[HeadKinematics]) -> Motion:
+    """Impacts of one length and rate side by side."""
+    first = impacts[0].motion
+    stack = np.ascontiguousarray(np.concatenate([k.motion.stack for k in impacts], axis=3))
+    return Motion(first.sample_rate_hz, first.signals, stack)
+
+
+def fresh(motion: Motion) -> Motion:
     """The same motion without anything computed from it: what each timed call starts from."""
-    return HeadKinematics(k.sample_rate_hz, k.linear_acceleration_g, k.angular_velocity, k.angular_acceleration)
+    return Motion(motion.sample_rate_hz, motion.signals, motion.stack)

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
         UnknownModel,
     )
     from headimpact.filtering import NO_FILTER, PAPER, AppliedFilter, LowPass
-    from headimpact.kinematics import STANDARD_GRAVITY, HeadKinematics
-    from headimpact.preparation import Preparation, prepare
+    from headimpact.kinematics import HeadKinematics, Motion
+    from headimpact.preparation import Preparation, prepare, prepare_many
     from headimpact.quality import QualityNote
-    from headimpact.recording import AXES, Mounting, Recording, Signal
+    from headimpact.recording import AXES, STANDARD_GRAVITY, Mounting, Recording, Signal
     from headimpact.risk import (
         DEFAULT_OPERATING_POINTS,
         LAKSARI_2020,
@@ -67,6 +67,7 @@ __all__ = [
     "HeadimpactError",
     "ImpactScore",
     "LowPass",
+    "Motion",
     "Mounting",
     "OperatingPoint",
     "OperatingPointRequest",
@@ -87,6 +88,7 @@ __all__ = [
     "load_model",
     "peak_brain_angles",
     "prepare",
+    "prepare_many",
     "resolve_operating_point",
     "score",
     "score_many",
@@ -98,10 +100,10 @@ _MODULES = {
     "criteria.extra": ("EXTRA_CRITERIA", "ExtraCriterion"),
     "errors": ("HeadimpactError", "OperatingPointUnreachable", "TraceError", "UnknownCriterion", "UnknownModel"),
     "filtering": ("NO_FILTER", "PAPER", "AppliedFilter", "LowPass"),
-    "kinematics": ("STANDARD_GRAVITY", "HeadKinematics"),
-    "preparation": ("Preparation", "prepare"),
+    "kinematics": ("HeadKinematics", "Motion"),
+    "preparation": ("Preparation", "prepare", "prepare_many"),
     "quality": ("QualityNote",),
-    "recording": ("AXES", "Mounting", "Recording", "Signal"),
+    "recording": ("AXES", "STANDARD_GRAVITY", "Mounting", "Recording", "Signal"),
     "risk": (
         "DEFAULT_OPERATING_POINTS",
         "LAKSARI_2020",

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from headimpact.kinematics import accumulate, largest, largest_magnitude, squared_norm
+from headimpact.kinematics import accumulate, squared_norm
 from headimpact.published import BRAIN_MODEL
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +31,8 @@ FloatArray = NDArray[np.float64]
 # The running sum holds exp(+L t): a record is cut where that factor reaches exp(16), long before digits are lost.
 LARGEST_EXPONENT = 16.0
 TAYLOR_TERMS = 20
+# Impacts solved at once: their states stay in the processor's cache.
+BLOCK = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,7 @@ def brain_angle_history(
     Parameters
     ----------
     angular_acceleration
-        Angular acceleration of the skull [rad/s^2], n x 3 or n x 3 x m.
+        Angular acceleration of the skull [rad/s^2], n x 3, or n x 3 x m of m impacts.
     sample_rate_hz
         Samples per second [Hz].
     oscillators
@@ -74,20 +76,8 @@ def brain_angle_history(
     ndarray
         Brain angles [rad], of the shape of the input.
     """
-    alpha = angular_acceleration
-    angle = np.empty_like(alpha)
-    angle[0] = 0.0
-    steps = alpha.shape[0] - 1
-    segment = _segment_length(oscillators, sample_rate_hz)
-    state: tuple[FloatArray, FloatArray] | None = None
-    for start in range(0, steps, segment):
-        stop = min(start + segment, steps)
-        tables = _tables(oscillators, sample_rate_hz, stop - start)
-        advance = _advance if alpha.ndim == 2 else _advance_block
-        re, im = advance(alpha[start : stop + 1], angle[start : stop + 1], state, tables)
-        if stop < steps:
-            state = _state_at_end(re, im, alpha[stop], tables, angle[stop])
-    return angle
+    alpha = np.atleast_3d(angular_acceleration)
+    return brain_angles(alpha, sample_rate_hz, oscillators).reshape(angular_acceleration.shape)
 
 
 def peak_brain_angles(
@@ -98,7 +88,7 @@ def peak_brain_angles(
     Parameters
     ----------
     angular_acceleration
-        Angular acceleration of the skull [rad/s^2], n x 3 or n x 3 x m.
+        Angular acceleration of the skull [rad/s^2], n x 3, or n x 3 x m of m impacts.
     sample_rate_hz
         Samples per second [Hz].
     oscillators
@@ -109,89 +99,84 @@ def peak_brain_angles(
     tuple of ndarray
         Peaks per axis (3 or 3 x m) and of the resultant (scalar or m).
     """
-    angle = brain_angle_history(angular_acceleration, sample_rate_hz, oscillators)
-    return largest_magnitude(angle), np.sqrt(largest(squared_norm(angle)))
+    alpha = np.atleast_3d(angular_acceleration)
+    components, resultants = np.empty((3, alpha.shape[2])), np.empty(alpha.shape[2])
+    for first in range(0, alpha.shape[2], BLOCK):
+        block = slice(first, first + BLOCK)
+        angle = brain_angles(np.ascontiguousarray(alpha[..., block]), sample_rate_hz, oscillators)
+        components[:, block], resultants[block] = peaks_of(angle)
+    one = angular_acceleration.ndim == 2
+    return (components[:, 0], resultants[0]) if one else (components, resultants)
+
+
+def peaks_of(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Largest absolute angle of each axis (3 x m) and of the resultant (m), of brain angles n x 3 x m [rad]."""
+    lowest, highest = np.minimum.reduce(angle, axis=0), np.maximum.reduce(angle, axis=0)
+    components: FloatArray = np.abs(np.maximum(-lowest, highest))
+    return components, np.sqrt(np.maximum.reduce(squared_norm(angle), axis=0))
+
+
+def brain_angles(alpha: FloatArray, sample_rate_hz: float, oscillators: Oscillators = BRAIN) -> FloatArray:
+    """The same as :func:`brain_angle_history`, of m impacts: n x 3 x m."""
+    angle = np.empty_like(alpha)
+    angle[0] = 0.0
+    steps = alpha.shape[0] - 1
+    segment = _segment_length(oscillators, sample_rate_hz)
+    state: FloatArray | None = None
+    for start in range(0, steps, segment):
+        stop = min(start + segment, steps)
+        tables = _tables(oscillators, sample_rate_hz, stop - start, by_rows=alpha.shape[2] > 1)
+        last = _advance(alpha[start : stop + 1], angle[start : stop + 1], state, tables)
+        if stop < steps:
+            state = _state_at_end(last, alpha[stop], tables, angle[stop])
+    return angle
 
 
 def _segment_length(oscillators: Oscillators, sample_rate_hz: float) -> int:
     return max(1, int(LARGEST_EXPONENT / max(oscillators.decay_rate) * sample_rate_hz))
 
 
-def _advance(
-    alpha: FloatArray, angle: FloatArray, state: tuple[FloatArray, FloatArray] | None, tables: _Tables
-) -> tuple[FloatArray, FloatArray]:
-    """Fill `angle` over one segment of one impact, from `state`, (Re z, Im z) at its first sample, None at rest.
+def _advance(alpha: FloatArray, angle: FloatArray, state: FloatArray | None, tables: _Tables) -> FloatArray:
+    """Fill `angle` over one segment, from `state`, (Re z, Im z) at its first sample, None at rest.
 
     With weights g_j and u_k = sum over j < k of g_j alpha_j, the state is z_k = exp(s t_k) u_k + c1 alpha_k, and the
-    angle its imaginary part. Returns u at the last sample.
+    angle its imaginary part. Returns (Re u, Im u) at the last sample, 2 x 3 x m.
     """
-    re = tables.weight_re * alpha[:-1]
-    im = tables.weight_im * alpha[:-1]
+    u = tables.weight * alpha[:-1, None]
     if state is not None:
-        re[0] += state[0]
-        im[0] += state[1]
-    accumulate(re)
-    accumulate(im)
-    last = re[-1].copy(), im[-1].copy()
-    re *= tables.back_im
-    im *= tables.back_re
+        u[0] += state
+    accumulate(u)
+    last: FloatArray = u[-1].copy()
+    u *= tables.turn
     now = np.multiply(alpha[1:], tables.c1_im, out=angle[1:])
-    now += re
-    now += im
+    now += u[:, 0]
+    now += u[:, 1]
     return last
 
 
-def _advance_block(
-    alpha: FloatArray, angle: FloatArray, state: tuple[FloatArray, FloatArray] | None, tables: _Tables
-) -> tuple[FloatArray, FloatArray]:
-    """The same for a block of impacts, n x 3 x m: the same operations, but sample by sample and with Re and Im as one.
-
-    So the rows at work stay in the processor's cache.
-    """
-    u = np.zeros((2, *alpha.shape[1:])) if state is None else np.stack(state)
-    share = np.empty_like(u)
-    share_re, share_im = share
-    weights = np.stack((tables.weight_re, tables.weight_im), axis=1)[..., None]
-    back = np.stack((tables.back_im, tables.back_re), axis=1)[..., None]
-    c1_im = tables.c1_im[:, None]
-    for weight, turn, past, following, now in zip(weights, back, alpha[:-1], alpha[1:], angle[1:], strict=True):
-        np.multiply(weight, past, out=share)
-        u += share
-        np.multiply(u, turn, out=share)
-        np.multiply(following, c1_im, out=now)
-        now += share_re
-        now += share_im
-    return u[0], u[1]
-
-
-def _state_at_end(
-    re: FloatArray, im: FloatArray, alpha: FloatArray, tables: _Tables, angle: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(Re z, Im z) at a segment's last sample, where the next one starts."""
-    back_re, back_im, c1_re = tables.back_re[-1], tables.back_im[-1], tables.c1_re
-    if re.ndim == 2:
-        back_re, back_im, c1_re = back_re[:, None], back_im[:, None], c1_re[:, None]
-    return re * back_re - im * back_im + c1_re * alpha, angle
+def _state_at_end(u: FloatArray, alpha: FloatArray, tables: _Tables, angle: FloatArray) -> FloatArray:
+    """(Re z, Im z) at a segment's last sample, where the next one starts, 2 x 3 x m."""
+    back_im, back_re = tables.turn[-1]
+    return np.stack((u[0] * back_re - u[1] * back_im + tables.c1_re * alpha, angle))
 
 
 class _Tables(NamedTuple):
-    """What one segment needs, steps x 3.
+    """What one segment needs, steps x 2 x 3 x 1: the last axis is for the impacts.
 
-    The weights g_j = exp(-s t_j) (c1 + c0 exp(-s dt)), the first without its share of c1, since there the state is
-    given; exp(s t_k) of the steps k = 1, 2, ...; and c1.
+    `weight`, the real and imaginary parts of g_j = exp(-s t_j) (c1 + c0 exp(-s dt)), the first without its share of c1,
+    since there the state is given; `turn`, the imaginary and real parts of exp(s t_k) for the steps k = 1, 2, ...; c1's
+    parts, 3 x 1.
     """
 
-    weight_re: FloatArray
-    weight_im: FloatArray
-    back_re: FloatArray
-    back_im: FloatArray
+    weight: FloatArray
+    turn: FloatArray
     c1_re: FloatArray
     c1_im: FloatArray
 
 
 @lru_cache(maxsize=64)
-def _tables(oscillators: Oscillators, sample_rate_hz: float, steps: int) -> _Tables:
-    """First-order-hold weights.
+def _tables(oscillators: Oscillators, sample_rate_hz: float, steps: int, *, by_rows: bool) -> _Tables:
+    """First-order-hold weights, laid out as the impacts that they meet are: many by rows, one by components.
 
     z_k = exp(s dt) z_(k-1) + c0 alpha_(k-1) + c1 alpha_k with, for X = s dt,
     c1 = -(dt/wd) phi2(X), c0 = -(dt/wd) (phi1(X) - phi2(X)), phi1 = (exp(X) - 1)/X, phi2 = (exp(X) - 1 - X)/X^2,
@@ -205,12 +190,16 @@ def _tables(oscillators: Oscillators, sample_rate_hz: float, steps: int) -> _Tab
     c1 = -(dt / wd) * phi2
     c0 = -(dt / wd) * (phi1 - phi2)
     t = np.arange(steps)[:, None] * dt
-    weights = np.exp(-s * t) * (c1 + c0 * np.exp(-s * dt))
-    weights[0] = c0 * np.exp(-s * dt)
-    back = np.exp(s * (t + dt))
-    tables = (weights.real, weights.imag, back.real, back.imag, c1.real, c1.imag)
-    # laid out by component, as single impacts are
-    fixed = [np.asfortranarray(table, dtype=np.float64) for table in tables]
+    weight = np.exp(-s * t) * (c1 + c0 * np.exp(-s * dt))
+    weight[0] = c0 * np.exp(-s * dt)
+    turn = np.exp(s * (t + dt))
+    lay_out = np.ascontiguousarray if by_rows else np.asfortranarray
+    fixed = (
+        lay_out(np.stack((weight.real, weight.imag), axis=1)[..., None]),
+        lay_out(np.stack((turn.imag, turn.real), axis=1)[..., None]),
+        np.ascontiguousarray(c1.real)[:, None],
+        np.ascontiguousarray(c1.imag)[:, None],
+    )
     for table in fixed:
         table.flags.writeable = False
     return _Tables(*fixed)

@@ -65,7 +65,7 @@ def corner_frequency(cut_off: float | str, sample_rate_hz: float) -> float | Non
 
 
 def low_pass(x: FloatArray, corner_hz: float, sample_rate_hz: float) -> FloatArray:
-    """Filter every column forward and backward.
+    """Filter every record forward and backward.
 
     Equal to ``scipy.signal.sosfiltfilt`` of ``butter(2, corner_hz)`` with odd extension by min(9, n - 1) samples; the
     design is kept between calls, which is most of that function's cost.
@@ -73,19 +73,19 @@ def low_pass(x: FloatArray, corner_hz: float, sample_rate_hz: float) -> FloatArr
     Parameters
     ----------
     x
-        Samples, time on the first axis.
+        Samples, time on the last axis.
     corner_hz
         The Butterworth corner [Hz], from :func:`corner_frequency`.
     sample_rate_hz
         Samples per second [Hz].
     """
     b, a, zi = _design(corner_hz, sample_rate_hz)
-    extended = _odd_extension(x, min(9, x.shape[0] - 1))
-    rest = zi.reshape(-1, *(1,) * (x.ndim - 1))
-    forward, _ = signal.lfilter(b, a, extended, axis=0, zi=rest * extended[:1])
-    backward, _ = signal.lfilter(b, a, forward[::-1], axis=0, zi=rest * forward[-1:])
-    margin = (extended.shape[0] - x.shape[0]) // 2
-    return np.asfortranarray(backward[::-1][margin : margin + x.shape[0]])
+    margin = min(9, x.shape[-1] - 1)
+    extended = _odd_extension(x, margin)
+    forward, _ = signal.lfilter(b, a, extended, zi=zi * extended[..., :1])
+    backward, _ = signal.lfilter(b, a, forward[..., ::-1], zi=zi * forward[..., -1:])
+    filtered: FloatArray = backward[..., ::-1][..., margin : margin + x.shape[-1]]
+    return filtered
 
 
 @lru_cache(maxsize=256)
@@ -95,7 +95,10 @@ def _design(corner_hz: float, sample_rate_hz: float) -> tuple[FloatArray, FloatA
 
 
 def _odd_extension(x: FloatArray, count: int) -> FloatArray:
-    """Mirror the record through its end points, so that the filter meets no step there."""
-    if count == 0:
-        return x
-    return np.concatenate((2 * x[:1] - x[count:0:-1], x, 2 * x[-1:] - x[-2 : -count - 2 : -1]))
+    """Mirror each record through its end points, so that the filter meets no step there."""
+    n = x.shape[-1]
+    extended = np.empty((*x.shape[:-1], n + 2 * count))
+    extended[..., count : count + n] = x
+    np.subtract(2 * x[..., :1], x[..., count:0:-1], out=extended[..., :count])
+    np.subtract(2 * x[..., -1:], x[..., -2 : -count - 2 : -1], out=extended[..., count + n :])
+    return extended

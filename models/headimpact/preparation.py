@@ -1,78 +1,73 @@
-"""From a recording as sent to the motion of the head's centre of gravity.
+"""From recordings as sent to the motion of the head's centre of gravity.
 
 The order of work is fixed, so that two implementations agree: units; uniform samples; filter and differentiation at
-each signal's own rate; axes and rotation; one time base; transfer to the centre of gravity.
+each signal's own rate; axes and rotation; one time base; transfer to the centre of gravity. Recordings of one layout
+are worked on together; one recording is a block of one, on the same way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, floor, inf, radians
+from functools import cached_property
 
 import numpy as np
 
 from headimpact.errors import TraceError
-from headimpact.filtering import AppliedFilter, CutOff, corner_frequency, low_pass
-from headimpact.gaps import fill_gaps
+from headimpact.filtering import AppliedFilter, low_pass
 from headimpact.kinematics import (
-    STANDARD_GRAVITY,
-    FloatArray,
     HeadKinematics,
+    Motion,
     differentiate,
+    empty_stack,
+    rotated,
     running_integral,
     transfer_to_head_cg,
 )
-from headimpact.published import FILTERS, QUALITY_LIMITS
+from headimpact.plan import Group, Plan, channels_of, plan_of
+from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import (
-    AXES,
-    Channel,
     QualityNote,
     check_angular_acceleration,
     check_channels,
     check_identical,
-    check_rate,
     words,
 )
-from headimpact.record_rules import rate_of, require_derived_within, require_motion, require_within
-from headimpact.recording import Mounting, Recording, Signal, SignalName
+from headimpact.record_rules import derived_out_of_range, require_samples
+from headimpact.recording import FloatArray, Recording, SignalName
+from headimpact.time_base import brought
+from headimpact.uniform import Layout, Uniform, uniform
 
-TO_CRITERIA_UNIT: dict[str, float] = {
-    "g": 1.0,
-    "m/s^2": 1.0 / STANDARD_GRAVITY,
-    "rad/s": 1.0,
-    "deg/s": radians(1.0),
-    "rad/s^2": 1.0,
-    "deg/s^2": radians(1.0),
-}
-# Components that a plane of motion leaves: (linear axes, rotation axes).
-PLANES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
-    "sagittal": ((0, 2), (1,)),
-    "coronal": ((1, 2), (0,)),
-    "axial": ((0, 1), (2,)),
-}
-SAE_J211_TO_ANATOMICAL: FloatArray = np.array([1.0, -1.0, -1.0])
+# Impacts that are worked on at once: enough to spread NumPy's cost per call, few enough to stay in the processor's
+# cache.
+BLOCK = 128
+
+Tracks = dict[SignalName, FloatArray]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Preparation:
-    """A recording made ready for scoring, with what was done to it."""
+    """A recording made ready for scoring: the motion of its block, its place there, and what was done to it."""
 
-    kinematics: HeadKinematics
+    motion: Motion
     filters: tuple[AppliedFilter, ...]
     notes: tuple[QualityNote, ...]
     angular_velocity_source: str | None
     angular_acceleration_source: str | None
     pre_trigger_known: bool
+    place: int = 0
 
+    @classmethod
+    def of(cls, kinematics: HeadKinematics, *, pre_trigger_known: bool = False) -> Preparation:
+        """Motion of the head's centre of gravity that needs no preparation; whether its times count from a trigger."""
+        rotation = "supplied" if kinematics.angular_acceleration is not None else None
+        velocity = "supplied" if kinematics.angular_velocity is not None else None
+        return cls(kinematics.motion, (), (), velocity, rotation, pre_trigger_known)
 
-@dataclass(frozen=True, slots=True)
-class _Uniform:
-    """A signal on uniform samples: `start_s` is its first sample's time on the clock the signals share."""
-
-    values: FloatArray
-    rate: float
-    start_s: float
+    @cached_property
+    def kinematics(self) -> HeadKinematics:
+        """The motion of this impact."""
+        return self.motion.impact(self.place)
 
 
 def prepare(recording: Recording) -> Preparation:
@@ -83,273 +78,228 @@ def prepare(recording: Recording) -> Preparation:
     TraceError
         The recording breaks a rule; its code, signal, channel and sample say which and where.
     """
-    notes: list[QualityNote] = []
-    if recording.fill_gaps:
-        recording = _without_gaps(recording, notes)
-    signals = recording.signals()
-    if not signals:
-        raise TraceError("no-signal", "A recording needs linear acceleration, angular velocity or both.")
-    require_motion(signals)
-    clock_start_s = min((float(s.time_s[0]) for _, s in signals if s.time_s is not None), default=0.0)
-    sent = {name: _uniform(name, signal, clock_start_s, notes) for name, signal in signals}
-    notes += _notes_as_sent(recording, sent)
-    filtered, filters = _filtered(recording, sent, notes)
-    sources = _with_derived(filtered, sent, notes)
-    in_head = {name: _to_head_axes(name, signal, recording) for name, signal in filtered.items()}
-    if recording.mounting is not None:
-        in_head = {name: _undelayed(name, signal, recording.mounting) for name, signal in in_head.items()}
-    if recording.constrained_plane is not None:
-        in_head = {name: _constrain(name, s, recording.constrained_plane, notes) for name, s in in_head.items()}
-    rate, start_s, aligned = _one_time_base(in_head)
-    if sources[1] == "five_point_stencil":
-        require_derived_within(aligned["angular_acceleration"])
-    aligned = _at_head_cg(aligned, recording)
-    start_ms = (start_s - clock_start_s) * 1000.0 - (recording.pre_trigger_ms or 0.0)
-    kinematics = HeadKinematics(
-        sample_rate_hz=rate,
-        linear_acceleration_g=aligned.get("linear_acceleration"),
-        angular_velocity=aligned.get("angular_velocity"),
-        angular_acceleration=aligned.get("angular_acceleration"),
-        start_time_ms=start_ms,
-    )
-    return Preparation(kinematics, filters, tuple(notes), *sources, recording.pre_trigger_ms is not None)
+    sent = uniform(recording)
+    (found,) = _prepared(plan_of(sent.layout), [sent])
+    if isinstance(found, TraceError):
+        raise found
+    return found
 
 
-def _without_gaps(recording: Recording, notes: list[QualityNote]) -> Recording:
-    """The recording with its short gaps filled, each signal's noted."""
-    filled: dict[SignalName, Signal] = {}
-    for name, signal in recording.signals():
-        filled[name], count = fill_gaps(signal)
-        if count:
-            detail = f"{count} missing samples of the {words(name)} were filled by interpolation."
-            notes.append(QualityNote("gaps_filled", "note", detail, name))
-    return replace(recording, **filled)  # type: ignore[arg-type] # the keys are its fields
+def prepare_many(recordings: Iterable[Recording]) -> list[Preparation | TraceError]:
+    """The same for many, in their order and with the same digits; the fault of one stands in its place."""
+    found: dict[int, Preparation | TraceError] = {}
+    alike: dict[Layout, list[tuple[int, Uniform]]] = {}
+    for number, recording in enumerate(recordings):
+        try:
+            sent = uniform(recording)
+            plan_of(sent.layout)
+        except TraceError as error:
+            found[number] = error
+        else:
+            alike.setdefault(sent.layout, []).append((number, sent))
+    for layout, members in alike.items():
+        for first in range(0, len(members), BLOCK):
+            numbers, block = zip(*members[first : first + BLOCK], strict=True)
+            found |= zip(numbers, _prepared(plan_of(layout), block), strict=True)
+    return [found[number] for number in range(len(found))]
 
 
-def _uniform(name: SignalName, signal: Signal, clock_start_s: float, notes: list[QualityNote]) -> _Uniform:
-    """A signal in the criteria's unit on uniform samples."""
-    factor = TO_CRITERIA_UNIT[signal.unit]
-    # by component: every filter, maximum and sum over time is then contiguous
-    values = np.asfortranarray(signal.values, dtype=np.float64)
-    if factor != 1.0:
-        values = values * factor
-    require_within(name, values)
-    if signal.time_s is None:
-        assert signal.sample_rate_hz is not None
-        rate, start_s = float(signal.sample_rate_hz), clock_start_s
-    else:
-        rate, start_s = rate_of(name, signal.time_s), float(signal.time_s[0])
-        values = _resampled(name, values, signal.time_s, rate, notes)
-    limits = QUALITY_LIMITS["record"]
-    if not limits["minimum_rate_hz"] <= rate <= limits["maximum_rate_hz"]:
-        raise TraceError(
-            "sample-rate",
-            f"The {words(name)} must be sampled at {limits['minimum_rate_hz']:g} to {limits['maximum_rate_hz']:g} Hz.",
-            signal=name,
+def _prepared(plan: Plan, block: Sequence[Uniform]) -> list[Preparation | TraceError]:
+    """Recordings of one layout, each prepared or with its fault."""
+    samples = [_in_criteria_units(plan, group, block) for group in plan.groups]
+    noted: list[list[QualityNote]] = [[] for _ in block]
+    faults: dict[int, TraceError] = {}
+    for place in _suspects(plan, samples):
+        try:
+            noted[place] += _looked_at(plan, samples, place)
+        except TraceError as error:
+            faults[place] = error
+    if faults:
+        return _without(plan, block, faults)
+    motion = _motion(plan, samples, noted)
+    if plan.angular_acceleration_source == "five_point_stencil":
+        faults = _derived_out_of_range(motion)
+        if faults:
+            return _without(plan, block, faults)
+    return [
+        Preparation(
+            motion,
+            plan.filters,
+            (*sent.notes, *plan.notes, *noted[place]),
+            plan.angular_velocity_source,
+            plan.angular_acceleration_source,
+            plan.layout.pre_trigger_ms is not None,
+            place,
         )
-    notes += check_rate(name, rate)
-    return _Uniform(values, rate, start_s)
+        for place, sent in enumerate(block)
+    ]
 
 
-def _resampled(
-    name: SignalName, values: FloatArray, time_s: FloatArray, rate: float, notes: list[QualityNote]
-) -> FloatArray:
-    """Linear interpolation onto n equal steps from the first stamp to the last, where the stamps are not equal."""
-    steps = np.diff(time_s)
-    jitter = float(np.abs(steps * rate - 1.0).max())
-    if jitter <= QUALITY_LIMITS["record"]["uniform_jitter"]:
-        return values
-    notes.append(
-        QualityNote(
-            "resampled",
-            "note",
-            f"The time stamps of the {words(name)} jitter by up to {jitter:.2%} of a step; it was resampled to "
-            f"{rate:.6g} Hz.",
-            name,
-        )
-    )
-    even = np.linspace(time_s[0], time_s[-1], time_s.size)
-    return np.stack([np.interp(even, time_s, values[:, axis]) for axis in range(3)], axis=1)
+def _without(plan: Plan, block: Sequence[Uniform], faults: dict[int, TraceError]) -> list[Preparation | TraceError]:
+    """The others of a block, with the faults in their places."""
+    others = [sent for place, sent in enumerate(block) if place not in faults]
+    prepared = iter(_prepared(plan, others)) if others else iter(())
+    return [faults[place] if place in faults else next(prepared) for place in range(len(block))]
 
 
-def _notes_as_sent(recording: Recording, sent: dict[SignalName, _Uniform]) -> Iterator[QualityNote]:
-    """Notes on every channel; those of equal length are checked together."""
-    by_length: dict[int, list[tuple[SignalName, Signal]]] = {}
-    for name, signal in recording.signals():
-        by_length.setdefault(signal.values.shape[0], []).append((name, signal))
-    for signals in by_length.values():
-        channels = [Channel(name, axis, _full_scale(signal)) for name, signal in signals for axis in AXES]
-        # transposed and back: stacked by component
-        samples = np.concatenate([sent[name].values.T for name, _ in signals]).T
-        yield from check_channels(channels, samples, recording.constrained_plane is not None)
-    if "linear_acceleration" in sent:
-        for rotation in ("angular_velocity", "angular_acceleration"):
-            if rotation in sent:
-                yield from check_identical(
-                    ("linear_acceleration", sent["linear_acceleration"].values), (rotation, sent[rotation].values)
-                )
+def _in_criteria_units(plan: Plan, group: Group, block: Sequence[Uniform]) -> FloatArray:
+    """The samples of a group of signals, m x channels x n."""
+    n = plan.layout.signals[group.members[0]].track.samples
+    samples = np.empty((len(block), 3 * len(group.members), n))
+    for row, number in enumerate(group.members):
+        channels = samples[:, 3 * row : 3 * row + 3]
+        for place, sent in enumerate(block):
+            channels[place] = sent.samples[number].T
+        if plan.signals[number].factor != 1.0:
+            channels *= plan.signals[number].factor
+    return samples
 
 
-def _full_scale(signal: Signal) -> float:
-    """The declared range in the criteria's unit; infinite where none is declared."""
-    return inf if signal.declared_range is None else signal.declared_range * TO_CRITERIA_UNIT[signal.unit]
+def _suspects(plan: Plan, samples: Sequence[FloatArray]) -> list[int]:
+    """The places of those recordings that a rule or a check may find something in."""
+    suspect = plan.groups[0].screen.suspects(samples[0])
+    for group, found in zip(plan.groups[1:], samples[1:], strict=True):
+        suspect |= group.screen.suspects(found)
+    places: list[int] = np.flatnonzero(suspect).tolist()
+    return places
 
 
-def _filtered(
-    recording: Recording, sent: dict[SignalName, _Uniform], notes: list[QualityNote]
-) -> tuple[dict[SignalName, _Uniform], tuple[AppliedFilter, ...]]:
-    """Each signal low-passed at its own rate; supplied angular acceleration is used as it is."""
-    filters: list[AppliedFilter] = []
-    filtered = dict(sent)
-    choices: dict[SignalName, CutOff] = {
-        "linear_acceleration": recording.low_pass.linear_acceleration,
-        "angular_velocity": recording.low_pass.angular_velocity,
+def _looked_at(plan: Plan, samples: Sequence[FloatArray], place: int) -> Iterator[QualityNote]:
+    """The rules and checks of one recording's samples, one by one."""
+    signals = plan.layout.signals
+    values: Tracks = {
+        signals[number].name: found[place, 3 * row : 3 * row + 3].T
+        for group, found in zip(plan.groups, samples, strict=True)
+        for row, number in enumerate(group.members)
     }
-    for name, cut_off in choices.items():
-        if name in sent and cut_off is not None:
-            filtered[name], done = _filter_one(name, sent[name], cut_off, notes)
-            filters.append(done)
-    return filtered, tuple(filters)
+    require_samples([(signal.name, values[signal.name]) for signal in signals])
+    planar = plan.layout.constrained_plane is not None
+    for group, found in zip(plan.groups, samples, strict=True):
+        yield from check_channels(channels_of([signals[i] for i in group.members]), found[place].T, planar=planar)
+    for name in ("angular_velocity", "angular_acceleration"):
+        if "linear_acceleration" in values and name in values:
+            yield from check_identical(("linear_acceleration", values["linear_acceleration"]), (name, values[name]))
 
 
-def _filter_one(
-    name: SignalName, signal: _Uniform, cut_off: float | str, notes: list[QualityNote]
-) -> tuple[_Uniform, AppliedFilter]:
-    corner = corner_frequency(cut_off, signal.rate)
-    label = cut_off if isinstance(cut_off, str) else f"{cut_off:g} Hz"
-    if corner is None:
-        notes.append(
-            QualityNote(
-                "filter_skipped",
-                "warning",
-                f"The {words(name)} was not filtered: its rate of {signal.rate:.6g} Hz cannot carry {label}.",
-                name,
+def _motion(plan: Plan, samples: Sequence[FloatArray], noted: list[list[QualityNote]]) -> Motion:
+    """The motion of the heads' centres of gravity."""
+    signals, impacts = tuple(plan.tracks), samples[0].shape[0]
+    stack = empty_stack(plan.base.samples, len(signals), impacts)
+    in_place = plan.base.keeps_all
+    tracks = {
+        name: stack[:, row] if in_place else empty_stack(track.samples, 1, impacts)[:, 0]
+        for row, (name, track) in enumerate(plan.tracks.items())
+    }
+    _fill(plan, samples, tracks)
+    _derive(plan, tracks, noted)
+    for name, values in tracks.items():
+        _to_head_axes(plan, name, values, noted)
+    if not in_place:
+        for row, name in enumerate(signals):
+            stack[:, row] = brought(tracks[name], plan.base.ways[name])
+    if plan.offset_m is not None:
+        a, w, alpha = (stack[:, row] for row in range(3))
+        a[...] = transfer_to_head_cg(a, w, alpha, plan.offset_m)
+    return Motion(plan.base.rate_hz, signals, stack, plan.start_time_ms)
+
+
+def _fill(plan: Plan, samples: Sequence[FloatArray], tracks: Tracks) -> None:
+    """The signals as sent, filtered where they are to be."""
+    for group, found in zip(plan.groups, samples, strict=True):
+        for row, number in enumerate(group.members):
+            signal = plan.signals[number]
+            values = found[:, 3 * row : 3 * row + 3]
+            if signal.corner_hz is not None:
+                values = low_pass(values, signal.corner_hz, signal.rate_hz)
+            tracks[signal.name][...] = values.transpose(2, 1, 0)
+
+
+def _derive(plan: Plan, tracks: Tracks, noted: list[list[QualityNote]]) -> None:
+    """What one rotation signal says of the other: velocity by its integral, acceleration by its derivative."""
+    if plan.angular_velocity_source is None:
+        return
+    w, alpha = tracks["angular_velocity"], tracks["angular_acceleration"]
+    if plan.angular_velocity_source == "integral":
+        w[...] = running_integral(alpha, plan.tracks["angular_acceleration"].rate_hz)
+        return
+    rate = plan.tracks["angular_velocity"].rate_hz
+    if plan.comparison is None:
+        differentiate(w, rate, out=alpha)
+        return
+    derived = brought(differentiate(w, rate), plan.comparison.ways["angular_velocity"])
+    supplied = brought(alpha, plan.comparison.ways["angular_acceleration"])
+    for place, notes in enumerate(noted):
+        notes += check_angular_acceleration(supplied[..., place], derived[..., place])
+
+
+def _to_head_axes(plan: Plan, name: SignalName, values: FloatArray, noted: list[list[QualityNote]]) -> None:
+    """Take SAE J211's axes to the anatomical ones, sensor axes to head axes, and keep to a plane; in place."""
+    frame = plan.frames[name]
+    if plan.mirrored:
+        values[:, 1:] *= -1.0
+    if frame.rotation is not None:
+        values[...] = rotated(values, frame.rotation)
+    if not frame.removed:
+        return
+    beyond = [np.abs(values[:, axis]).max(axis=0) for axis in frame.removed]
+    for axis in frame.removed:
+        values[:, axis] = 0.0
+    for notes, removed in zip(noted, np.max(beyond, axis=0).tolist(), strict=True):
+        if removed > 0:
+            detail = (
+                f"The {words(name)} outside the {plan.layout.constrained_plane} plane, up to {removed:.4g}, was set to "
+                "zero."
             )
-        )
-        return signal, AppliedFilter(name, cut_off, None, applied=False)
-    if isinstance(cut_off, str) and signal.rate < FILTERS["channel_frequency_class_rate"] * float(cut_off[3:]):
-        notes.append(
-            QualityNote(
-                "low_rate_for_class",
-                "note",
-                f"The {words(name)} was sampled at {signal.rate:.6g} Hz, under "
-                f"{FILTERS['channel_frequency_class_rate']} times the class {label}.",
-                name,
-            )
-        )
-    values = low_pass(signal.values, corner, signal.rate)
-    return replace(signal, values=values), AppliedFilter(name, cut_off, corner, applied=True)
+            notes.append(QualityNote("out_of_plane_removed", "note", detail, name))
 
 
-def _with_derived(
-    filtered: dict[SignalName, _Uniform],
-    sent: dict[SignalName, _Uniform],
-    notes: list[QualityNote],
-) -> tuple[str | None, str | None]:
-    """Add what one rotation signal says of the other; say where velocity and acceleration come from."""
-    if "angular_velocity" not in sent:
-        if "angular_acceleration" not in sent:
-            return None, None
-        alpha = sent["angular_acceleration"]
-        filtered["angular_velocity"] = replace(alpha, values=running_integral(alpha.values, alpha.rate))
-        notes.append(
-            QualityNote(
-                "angular_velocity_integrated",
-                "note",
-                "No angular velocity was recorded; it is the integral of the angular acceleration, zero at the start.",
-                "angular_velocity",
-            )
-        )
-        return "integral", "supplied"
-    w = filtered["angular_velocity"]
-    derived = replace(w, values=differentiate(w.values, w.rate))
-    if "angular_acceleration" not in sent:
-        filtered["angular_acceleration"] = derived
-        return "supplied", "five_point_stencil"
-    _, _, pair = _one_time_base({"angular_acceleration": sent["angular_acceleration"], "angular_velocity": derived})
-    notes += check_angular_acceleration(pair["angular_acceleration"], pair["angular_velocity"])
-    return "supplied", "supplied"
+def _derived_out_of_range(motion: Motion) -> dict[int, TraceError]:
+    """Those of which the derived angular acceleration is more than any head survives."""
+    largest = motion.magnitudes[motion.rows.angular_acceleration].max(axis=0)
+    beyond = largest > QUALITY_LIMITS["angular_acceleration"]["refused"]
+    return {place: derived_out_of_range() for place in np.flatnonzero(beyond).tolist()}
 
 
-def _to_head_axes(name: SignalName, signal: _Uniform, recording: Recording) -> _Uniform:
-    """Take SAE J211's axes to the anatomical ones, then rotate sensor axes to head axes."""
-    values = signal.values
-    if recording.axes == "sae_j211":
-        values = values * SAE_J211_TO_ANATOMICAL
-    if recording.mounting is not None:
-        linear = name == "linear_acceleration"
-        rotation = recording.mounting.accelerometer_rotation if linear else recording.mounting.gyroscope_rotation
-        values = values @ rotation.T
-    return signal if values is signal.values else replace(signal, values=values)
+@dataclass(frozen=True)
+class Block:
+    """Preparations that can be scored together: their motion, and which of them it holds, in its order."""
+
+    motion: Motion
+    members: list[int]
 
 
-def _undelayed(name: SignalName, signal: _Uniform, mounting: Mounting) -> _Uniform:
-    """A signal at the time of the motion rather than at that of its sensor's samples."""
-    linear = name == "linear_acceleration"
-    delay_s = mounting.accelerometer_delay_s if linear else mounting.gyroscope_delay_s
-    return replace(signal, start_s=signal.start_s - delay_s) if delay_s else signal
+def blocks_of(preparations: Sequence[Preparation]) -> Iterator[Block]:
+    """The blocks that preparations were made in, and others of those that were made alone."""
+    together: dict[int, list[int]] = {}
+    alone: dict[tuple[object, ...], list[int]] = {}
+    for number, preparation in enumerate(preparations):
+        motion = preparation.motion
+        if motion.impacts > 1:
+            together.setdefault(id(motion), []).append(number)
+        else:
+            alike = (motion.samples, motion.sample_rate_hz, motion.signals, motion.start_time_ms)
+            alone.setdefault(alike, []).append(number)
+    for members in together.values():
+        yield Block(_chosen(preparations[members[0]].motion, [preparations[i].place for i in members]), members)
+    for members in alone.values():
+        for first in range(0, len(members), BLOCK):
+            block = members[first : first + BLOCK]
+            yield Block(_joined([preparations[i].motion for i in block]), block)
 
 
-def _constrain(name: SignalName, signal: _Uniform, plane: str, notes: list[QualityNote]) -> _Uniform:
-    """Set the motion outside the recorded plane to zero."""
-    linear, rotation = PLANES[plane]
-    kept = linear if name == "linear_acceleration" else rotation
-    values = np.zeros_like(signal.values)
-    values[:, kept] = signal.values[:, kept]
-    removed = float(np.abs(signal.values - values).max())
-    if removed > 0:
-        notes.append(
-            QualityNote(
-                "out_of_plane_removed",
-                "note",
-                f"The {words(name)} outside the {plane} plane, up to {removed:.4g}, was set to zero.",
-                name,
-            )
-        )
-    return replace(signal, values=values)
+def _chosen(motion: Motion, places: list[int]) -> Motion:
+    """Some of a motion's impacts."""
+    if places == list(range(motion.impacts)):
+        return motion
+    return replace(motion, stack=np.ascontiguousarray(motion.stack[..., places]))
 
 
-def _one_time_base(signals: dict[SignalName, _Uniform]) -> tuple[float, float, dict[str, FloatArray]]:
-    """The samples of the highest-rate signal within the overlap of all; the others interpolated linearly onto them."""
-    base = max(signals.values(), key=lambda signal: signal.rate)
-    start = max(signal.start_s for signal in signals.values())
-    stop = min(signal.start_s + (signal.values.shape[0] - 1) / signal.rate for signal in signals.values())
-    # a thousandth of a step of slack, so that equal records do not lose a sample to rounding
-    first = max(0, ceil((start - base.start_s) * base.rate - 1e-3))
-    last = min(base.values.shape[0] - 1, floor((stop - base.start_s) * base.rate + 1e-3))
-    if last - first + 1 < QUALITY_LIMITS["record"]["minimum_samples"]:
-        raise TraceError("no-overlap", "The signals must overlap in time by at least 3 samples.")
-    time_s = base.start_s + np.arange(first, last + 1) / base.rate
-    aligned: dict[str, FloatArray] = {}
-    for name, signal in signals.items():
-        aligned[name] = _onto(signal, base, time_s, first, last)
-    return base.rate, base.start_s + first / base.rate, aligned
-
-
-def _onto(signal: _Uniform, base: _Uniform, time_s: FloatArray, first: int, last: int) -> FloatArray:
-    alike = abs(signal.rate - base.rate) <= 1e-9 * base.rate and signal.start_s == base.start_s
-    if alike:
-        return signal.values[first : last + 1]
-    position = (time_s - signal.start_s) * signal.rate
-    grid = np.arange(signal.values.shape[0])
-    return np.stack([np.interp(position, grid, signal.values[:, axis]) for axis in range(3)], axis=1)
-
-
-def _at_head_cg(aligned: dict[str, FloatArray], recording: Recording) -> dict[str, FloatArray]:
-    """Move the acceleration from the accelerometer to the centre of gravity."""
-    mounting = recording.mounting
-    if mounting is None or "linear_acceleration" not in aligned or not mounting.offset_m.any():
-        return aligned
-    if "angular_velocity" not in aligned:
-        raise TraceError(
-            "no-rotation-for-transfer",
-            "Moving the acceleration to the head's centre of gravity needs the angular velocity or acceleration.",
-            signal="angular_velocity",
-        )
-    moved = transfer_to_head_cg(
-        aligned["linear_acceleration"],
-        aligned["angular_velocity"],
-        aligned["angular_acceleration"],
-        mounting.offset_m,
-    )
-    return {**aligned, "linear_acceleration": moved}
+def _joined(motions: list[Motion]) -> Motion:
+    """Motions of one impact each, side by side."""
+    first = motions[0]
+    if len(motions) == 1:
+        return first
+    stack = empty_stack(first.samples, len(first.signals), len(motions))
+    for place, motion in enumerate(motions):
+        stack[..., place] = motion.stack[..., 0]
+    return replace(first, stack=stack)

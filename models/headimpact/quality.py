@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from headimpact.kinematics import HeadKinematics, largest
+from headimpact.kinematics import Motion
 from headimpact.published import QUALITY_LIMITS
 
 FloatArray = NDArray[np.float64]
@@ -47,7 +47,7 @@ class Channel:
     declared_range: float
 
 
-def check_channels(channels: Sequence[Channel], samples: FloatArray, planar: bool) -> Iterator[QualityNote]:
+def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: bool) -> Iterator[QualityNote]:
     """Notes on single channels as sent.
 
     Parameters
@@ -60,7 +60,7 @@ def check_channels(channels: Sequence[Channel], samples: FloatArray, planar: boo
         Whether the motion was constrained to a plane: channels that stay zero are then no finding.
     """
     magnitude = np.abs(samples)
-    peaks = largest(magnitude)
+    peaks: FloatArray = magnitude.max(axis=0)
     yield from _extreme_values(channels, peaks)
     if not planar:
         yield from _constant_channels(channels, samples)
@@ -122,7 +122,7 @@ def _edge_glitches(channels: Sequence[Channel], samples: FloatArray, peaks: Floa
         return
     for which, end in (("first", samples[: near + 1]), ("last", samples[: -near - 2 : -1])):
         steps = np.abs(end[1:] - end[:-1])
-        bound = np.maximum(limits["ratio"] * largest(steps[1:]), limits["share_of_peak"] * peaks)
+        bound = np.maximum(limits["ratio"] * steps[1:].max(axis=0), limits["share_of_peak"] * peaks)
         far = steps[0] > bound
         if far.any():
             for column in np.flatnonzero(far).tolist():
@@ -249,15 +249,12 @@ def _is_youth(level: str, youth_levels: list[str]) -> bool:
     return word in youth_levels or word.startswith("youth_")
 
 
-def check_units(kinematics: HeadKinematics) -> Iterator[QualityNote]:
+def check_units(peak_linear_acceleration_g: float, peak_angular_acceleration: float) -> Iterator[QualityNote]:
     """Angular against linear peaks: catches m/s^2 sent as g and deg/s sent as rad/s, which no single bound can."""
-    if kinematics.linear_acceleration_g is None or kinematics.angular_acceleration is None:
-        return
     limits = QUALITY_LIMITS["unit_check"]
-    pla, paa = float(kinematics.peak_linear_acceleration_g), float(kinematics.peak_angular_acceleration)
-    if pla == 0 or paa == 0:
+    if peak_linear_acceleration_g == 0 or peak_angular_acceleration == 0:
         return
-    ratio = paa * limits["lever_arm_m"] / (pla * limits["gravity_m_s2"])
+    ratio = peak_angular_acceleration * limits["lever_arm_m"] / (peak_linear_acceleration_g * limits["gravity_m_s2"])
     if not limits["lowest"] <= ratio <= limits["highest"]:
         yield QualityNote(
             "implausible_units",
@@ -268,31 +265,38 @@ def check_units(kinematics: HeadKinematics) -> Iterator[QualityNote]:
 
 
 def check_truncation(
-    kinematics: HeadKinematics, angle_peaks: Sequence[int] | None, pre_trigger_known: bool
+    motion: Motion, acceleration_peak: int | None, angle_peaks: Sequence[int] | None, *, pre_trigger_known: bool
 ) -> Iterator[QualityNote]:
     """Records that end too early (the brain model is slow) or whose peak is at an edge.
 
-    `angle_peaks` are the samples at which the brain angle peaks, by axis; 0 for an axis without rotation.
+    Parameters
+    ----------
+    motion
+        Whose length and times are looked at.
+    acceleration_peak
+        The sample at which the linear acceleration peaks; None where it was not recorded, or nothing moved.
+    angle_peaks
+        The samples at which the brain angle peaks, by axis; 0 for an axis without rotation. None without any.
+    pre_trigger_known
+        Whether times are counted from the trigger.
     """
-    reasons = list(_truncation_reasons(kinematics, angle_peaks, pre_trigger_known))
+    reasons = list(_truncation_reasons(motion, acceleration_peak, angle_peaks, pre_trigger_known))
     if reasons:
         yield QualityNote("record_truncated", "warning", " ".join(reasons))
 
 
 def _truncation_reasons(
-    kinematics: HeadKinematics, angle_peaks: Sequence[int] | None, pre_trigger_known: bool
+    motion: Motion, acceleration_peak: int | None, angle_peaks: Sequence[int] | None, pre_trigger_known: bool
 ) -> Iterator[str]:
     limits = QUALITY_LIMITS["record"]
-    last = kinematics.samples - 1
-    length_ms = last / kinematics.sample_rate_hz * 1000.0
-    after_ms = length_ms + kinematics.start_time_ms if pre_trigger_known else length_ms
-    if after_ms < limits["post_trigger_ms"] - 1000.0 / kinematics.sample_rate_hz:
+    last = motion.samples - 1
+    length_ms = last / motion.sample_rate_hz * 1000.0
+    after_ms = length_ms + motion.start_time_ms if pre_trigger_known else length_ms
+    if after_ms < limits["post_trigger_ms"] - 1000.0 / motion.sample_rate_hz:
         since = "trigger" if pre_trigger_known else "start"
         yield f"The record ends {after_ms:.4g} ms after its {since}, before {limits['post_trigger_ms']:g} ms."
-    if kinematics.linear_acceleration_g is not None:
-        peak = int(kinematics.linear_acceleration_squared.argmax())
-        if peak in (0, last) and kinematics.linear_acceleration_squared[peak] > 0:
-            yield "The linear acceleration peaks at the record's edge."
+    if acceleration_peak in {0, last}:
+        yield "The linear acceleration peaks at the record's edge."
     if angle_peaks is not None:
         late = (1 - limits["late_peak_fraction"]) * last
         axes = [axis for axis, sample in zip(AXES, angle_peaks, strict=True) if sample >= late]

@@ -5,6 +5,8 @@ The bounds are in data/quality.toml. Messages name the bound, never the offendin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from headimpact.errors import TraceError
@@ -20,14 +22,15 @@ UNITS_OF: dict[str, tuple[str, str]] = {
 }
 
 
-def require_motion(signals: list[tuple[SignalName, Signal]]) -> None:
-    """Refuse lengths and values that no criterion can use, and a record in which nothing moves."""
+def require_form(signals: list[tuple[SignalName, Signal]]) -> None:
+    """Refuse signals whose form no samples could make up for: none at all, their shape, length, unit or times."""
+    if not signals:
+        raise TraceError("no-signal", "A recording needs linear acceleration, angular velocity or both.")
     limits = QUALITY_LIMITS["record"]
     for name, signal in signals:
-        n = signal.values.shape[0]
         if signal.values.ndim != 2 or signal.values.shape[1] != 3:
             raise TraceError("wrong-shape", f"The {words(name)} must have three components.", signal=name)
-        if not limits["minimum_samples"] <= n <= limits["maximum_samples"]:
+        if not limits["minimum_samples"] <= signal.values.shape[0] <= limits["maximum_samples"]:
             raise TraceError(
                 "sample-count",
                 f"The {words(name)} must have {limits['minimum_samples']} to {limits['maximum_samples']} samples.",
@@ -38,18 +41,44 @@ def require_motion(signals: list[tuple[SignalName, Signal]]) -> None:
                 "unknown-unit", f"The {words(name)} must be in {' or '.join(UNITS_OF[name])}.", signal=name
             )
         _require_time_base(name, signal)
-        finite = np.isfinite(signal.values)
-        if not finite.all():
-            index, axis = np.argwhere(~finite)[0]
-            raise TraceError(
-                "missing-sample",
-                f"The {words(name)} holds a value that is no number.",
-                signal=name,
-                channel=AXES[axis],
-                index=int(index),
-            )
-    if all((signal.values == signal.values[0]).all() for _, signal in signals):
+
+
+def require_rate(name: SignalName, rate_hz: float) -> None:
+    """Refuse a rate that is too low for an impact, or that no sensor has."""
+    limits = QUALITY_LIMITS["record"]
+    if not limits["minimum_rate_hz"] <= rate_hz <= limits["maximum_rate_hz"]:
+        raise TraceError(
+            "sample-rate",
+            f"The {words(name)} must be sampled at {limits['minimum_rate_hz']:g} to {limits['maximum_rate_hz']:g} Hz.",
+            signal=name,
+        )
+
+
+def require_samples(signals: Sequence[tuple[SignalName, FloatArray]]) -> None:
+    """Refuse samples that no criterion can use, and a record in which nothing moves.
+
+    Each signal's name and its samples in the criteria's unit, n x 3.
+    """
+    for name, values in signals:
+        require_finite(name, values)
+    if all((values == values[0]).all() for _, values in signals):
         raise TraceError("constant-signal", "Every channel of every signal is constant: nothing moved.")
+    for name, values in signals:
+        require_within(name, values)
+
+
+def require_finite(name: SignalName, values: FloatArray) -> None:
+    """Refuse a missing sample."""
+    finite = np.isfinite(values)
+    if not finite.all():
+        index, axis = np.argwhere(~finite)[0]
+        raise TraceError(
+            "missing-sample",
+            f"The {words(name)} holds a value that is no number.",
+            signal=name,
+            channel=AXES[axis],
+            index=int(index),
+        )
 
 
 def _require_time_base(name: SignalName, signal: Signal) -> None:
@@ -101,15 +130,11 @@ def require_within(name: SignalName, values: FloatArray) -> None:
     )
 
 
-def require_derived_within(alpha: FloatArray) -> None:
-    """The same bound for angular acceleration that was derived, and so not checked as sent.
-
-    The velocity is to blame, but no one sample of it.
-    """
+def derived_out_of_range() -> TraceError:
+    """The same bound for angular acceleration that was derived: the velocity is to blame, but no one sample of it."""
     bound = QUALITY_LIMITS["angular_acceleration"]["refused"]
-    if alpha.max() > bound or alpha.min() < -bound:
-        raise TraceError(
-            "value-out-of-range",
-            f"The derivative of the angular velocity must stay within {bound:g} rad/s^2; check its unit and its rate.",
-            signal="angular_velocity",
-        )
+    return TraceError(
+        "value-out-of-range",
+        f"The derivative of the angular velocity must stay within {bound:g} rad/s^2; check its unit and its rate.",
+        signal="angular_velocity",
+    )

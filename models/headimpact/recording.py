@@ -6,6 +6,7 @@ Nothing here is converted, filtered or rotated: that is :mod:`headimpact.prepara
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import radians
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from headimpact.errors import TraceError
 from headimpact.filtering import PAPER, LowPass
+from headimpact.published import UNITS
 
 FloatArray = NDArray[np.float64]
 SignalName = Literal["linear_acceleration", "angular_velocity", "angular_acceleration"]
@@ -21,6 +23,17 @@ PlaneName = Literal["sagittal", "coronal", "axial"]
 
 AXES = ("x", "y", "z")
 SIGNALS: tuple[SignalName, ...] = ("linear_acceleration", "angular_velocity", "angular_acceleration")
+
+STANDARD_GRAVITY = float(UNITS["standard_gravity_m_s2"])
+TO_CRITERIA_UNIT: dict[str, float] = {
+    "g": 1.0,
+    "m/s^2": 1.0 / STANDARD_GRAVITY,
+    "rad/s": 1.0,
+    "deg/s": radians(1.0),
+    "rad/s^2": 1.0,
+    "deg/s^2": radians(1.0),
+}
+"""What a unit of a signal is in the criteria's: g, rad/s and rad/s^2."""
 
 ROTATION_TOLERANCE = 1e-3
 

@@ -5,27 +5,23 @@ One path serves one impact and batches of them, so that both give the same numbe
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import expit
 
-from headimpact.criteria import CRITERIA, Criterion, Evaluation, evaluate, missing_reason, present_signals
+from headimpact.criteria import CRITERIA, Criterion, Evaluation, evaluate, missing_reason
 from headimpact.criteria.extra import EXTRA_CRITERIA, ExtraCriterion
-from headimpact.criteria.windows import IntArray
 from headimpact.errors import UnknownCriterion
 from headimpact.filtering import AppliedFilter
-from headimpact.kinematics import FloatArray, HeadKinematics, largest, squared_norm
-from headimpact.preparation import Preparation
+from headimpact.kinematics import FloatArray, HeadKinematics, Motion
+from headimpact.preparation import Preparation, blocks_of
 from headimpact.quality import QualityNote, check_truncation, check_units
-from headimpact.recording import SIGNALS
+from headimpact.recording import SIGNALS, SignalName
 from headimpact.risk import LAKSARI_2020, RiskModel
-
-# Impacts per block: large enough to spread NumPy's cost per call, small enough to stay in the processor's cache.
-BLOCK = 256
 
 CONVENTIONS: Mapping[str, str] = {
     "maxima": "at_samples",
@@ -117,8 +113,7 @@ def score(
         A name in `extra_criteria` is none of ours.
     """
     extras = _extra(extra_criteria)
-    table = _Table(evaluate(preparation.kinematics), model, incidence, impacts=1)
-    return table.score(0, preparation, extras)
+    return _Table(preparation.motion, model, incidence).score(0, preparation, extras)
 
 
 def score_many(
@@ -131,9 +126,9 @@ def score_many(
     """Score many impacts, those of equal length, rate and signals together. Equal to :func:`score` bit for bit."""
     extras = _extra(extra_criteria)
     scores: list[ImpactScore | None] = [None] * len(preparations)
-    for block in _blocks(preparations):
-        table = _Table(evaluate(_stacked([preparations[i].kinematics for i in block])), model, incidence, len(block))
-        for row, i in enumerate(block):
+    for block in blocks_of(preparations):
+        table = _Table(block.motion, model, incidence)
+        for row, i in enumerate(block.members):
             scores[i] = table.score(row, preparations[i], extras)
     return [found for found in scores if found is not None]
 
@@ -145,77 +140,48 @@ def _extra(names: Sequence[str]) -> list[ExtraCriterion]:
     return [EXTRA_CRITERIA[name] for name in names]
 
 
-def _blocks(preparations: Sequence[Preparation]) -> Iterable[list[int]]:
-    alike: dict[tuple[object, ...], list[int]] = defaultdict(list)
-    for i, preparation in enumerate(preparations):
-        k = preparation.kinematics
-        alike[k.samples, k.sample_rate_hz, present_signals(k)].append(i)
-    for members in alike.values():
-        for first in range(0, len(members), BLOCK):
-            yield members[first : first + BLOCK]
-
-
-def _stacked(motions: Sequence[HeadKinematics]) -> HeadKinematics:
-    """A block of impacts, time first."""
-    first = motions[0]
-
-    def stack(name: str) -> FloatArray | None:
-        if getattr(first, name) is None:
-            return None
-        return np.stack([getattr(motion, name) for motion in motions], axis=2)
-
-    return HeadKinematics(
-        first.sample_rate_hz, stack("linear_acceleration_g"), stack("angular_velocity"), stack("angular_acceleration")
-    )
-
-
 class _Table:
     """Values and probabilities of a block, row by impact, and the scores read from it."""
 
-    def __init__(self, evaluation: Evaluation, model: RiskModel, incidence: float | None, impacts: int) -> None:
+    def __init__(self, motion: Motion, model: RiskModel, incidence: float | None) -> None:
+        evaluation = evaluate(motion)
+        self._motion = motion
         self._model = model
         self._incidence = model.incidence if incidence is None else incidence
-        self._evaluation = evaluation
-        self._missing = _missing_signals(evaluation.kinematics)
-        values = _tabulated(evaluation, impacts)
+        self._missing = _missing_signals(motion.signals)
+        values = _tabulated(evaluation)
         predictors = _linear_predictors(values, model, model.incidence_shift(incidence))
-        probabilities = expit(-predictors)
         self._values: list[list[list[float]]] = values.tolist()
         self._predictors: list[list[float]] = predictors.tolist()
-        self._probabilities: list[list[float]] = probabilities.tolist()
-        self._windows = {
-            key: (_rows(start, impacts), _rows(stop, impacts)) for key, (start, stop) in evaluation.windows.items()
-        }
-        self._peaks = _peak_rows(evaluation.kinematics, impacts)
-        self._angles = _angle_rows(evaluation.brain_angle, impacts)
+        self._probabilities: list[list[float]] = expit(-predictors).tolist()
+        self._windows = {key: (start.tolist(), stop.tolist()) for key, (start, stop) in evaluation.windows.items()}
+        self._peaks: dict[str, list[float]] = dict(zip(motion.signals, motion.peaks.tolist(), strict=True))
+        self._resultants, self._angle_peaks = _angle_rows(evaluation)
+        self._acceleration_peaks = _acceleration_peaks(motion)
 
     def score(self, row: int, preparation: Preparation, extras: Sequence[ExtraCriterion]) -> ImpactScore:
-        kinematics = preparation.kinematics
-        criteria = {
-            criterion.key: self._criterion(row, column, criterion, kinematics)
-            for column, criterion in enumerate(CRITERIA)
-        }
+        criteria = {criterion.key: self._criterion(row, column, criterion) for column, criterion in enumerate(CRITERIA)}
         return ImpactScore(
             model=self._model.version,
             incidence=self._incidence,
             criteria=criteria,
-            extra_criteria={extra.key: _extra_score(extra, kinematics) for extra in extras},
-            brain_angle=self._brain_angle(row, criteria["bam"], kinematics),
-            peaks=Peaks(*(None if rows is None else rows[row] for rows in self._peaks)),
+            extra_criteria={extra.key: _extra_score(extra, preparation.kinematics) for extra in extras},
+            brain_angle=self._brain_angle(row, criteria["bam"]),
+            peaks=Peaks(*(None if name not in self._peaks else self._peaks[name][row] for name in SIGNALS)),
             quality=preparation.notes + tuple(self._notes(row, preparation)),
             filters=preparation.filters,
             angular_velocity_source=preparation.angular_velocity_source,
             angular_acceleration_source=preparation.angular_acceleration_source,
         )
 
-    def _criterion(self, row: int, column: int, criterion: Criterion, kinematics: HeadKinematics) -> CriterionScore:
+    def _criterion(self, row: int, column: int, criterion: Criterion) -> CriterionScore:
         key = criterion.key
         reason = self._missing.get(key)
         if reason is not None:
             return CriterionScore(key, None, criterion.unit, reason=reason)
         x, y, z = self._values[row][column]
         value = (x, y, z) if criterion.components == 3 else x
-        window = self._window(row, key, kinematics) if key in self._windows else None
+        window = self._window(row, key) if key in self._windows else None
         if key not in self._model.curves:
             reason = f"Model {self._model.version} has no curve for it."
             return CriterionScore(key, value, criterion.unit, window_ms=window, reason=reason)
@@ -223,36 +189,39 @@ class _Table:
             key, value, criterion.unit, self._probabilities[row][column], self._predictors[row][column], window
         )
 
-    def _window(self, row: int, key: str, kinematics: HeadKinematics) -> tuple[float, float] | None:
+    def _window(self, row: int, key: str) -> tuple[float, float] | None:
         starts, stops = self._windows[key]
         start, stop = starts[row], stops[row]
-        return None if start == stop else (kinematics.time_ms(start), kinematics.time_ms(stop))
+        return None if start == stop else (self._motion.time_ms(start), self._motion.time_ms(stop))
 
-    def _brain_angle(self, row: int, bam: CriterionScore, kinematics: HeadKinematics) -> BrainAngle | None:
-        if self._angles is None or not isinstance(bam.value, tuple):
+    def _brain_angle(self, row: int, bam: CriterionScore) -> BrainAngle | None:
+        if self._angle_peaks is None or not isinstance(bam.value, tuple):
             return None
-        resultants, samples = self._angles
-        x, y, z = (kinematics.time_ms(sample) for sample in samples[row])
-        return BrainAngle(bam.value, resultants[row], (x, y, z))
+        x, y, z = map(self._motion.time_ms, self._angle_peaks[row])
+        return BrainAngle(bam.value, self._resultants[row], (x, y, z))
 
     def _notes(self, row: int, preparation: Preparation) -> Iterable[QualityNote]:
-        angle_peaks = None if self._angles is None else self._angles[1][row]
-        yield from check_units(preparation.kinematics)
-        yield from check_truncation(preparation.kinematics, angle_peaks, preparation.pre_trigger_known)
+        a, alpha = self._peaks.get("linear_acceleration"), self._peaks.get("angular_acceleration")
+        if a is not None and alpha is not None:
+            yield from check_units(a[row], alpha[row])
+        yield from check_truncation(
+            self._motion,
+            None if a is None or a[row] == 0 else self._acceleration_peaks[row],
+            None if self._angle_peaks is None else self._angle_peaks[row],
+            pre_trigger_known=preparation.pre_trigger_known,
+        )
 
 
-def _missing_signals(kinematics: HeadKinematics) -> dict[str, str]:
+@lru_cache(maxsize=16)
+def _missing_signals(present: tuple[SignalName, ...]) -> dict[str, str]:
     """Why each criterion that cannot be had cannot: by key."""
-    present = present_signals(kinematics)
-    if len(present) == len(SIGNALS):
-        return {}
-    absent = {criterion.key: set(criterion.needs) - present for criterion in CRITERIA}
+    absent = {criterion.key: set(criterion.needs) - set(present) for criterion in CRITERIA}
     return {key: missing_reason(names) for key, names in absent.items() if names}
 
 
-def _tabulated(evaluation: Evaluation, impacts: int) -> FloatArray:
+def _tabulated(evaluation: Evaluation) -> FloatArray:
     """Values as impacts x criteria x 3, zero where a criterion has one component or none."""
-    values = np.zeros((impacts, len(CRITERIA), 3))
+    values = np.zeros((evaluation.motion.impacts, len(CRITERIA), 3))
     for column, criterion in enumerate(CRITERIA):
         found = evaluation.values.get(criterion.key)
         if found is not None:
@@ -273,32 +242,22 @@ def _linear_predictors(values: FloatArray, model: RiskModel, shift: float) -> Fl
     return total
 
 
-def _rows(found: FloatArray | IntArray, impacts: int) -> list[Any]:
-    """One entry per impact of something evaluated on one impact or on a block."""
-    return [found.tolist()] if impacts == 1 and found.ndim == 0 else found.tolist()
+def _angle_rows(evaluation: Evaluation) -> tuple[list[float], list[list[int]] | None]:
+    """Peak resultant brain angle of each impact, and the sample at which each axis peaks; without rotation, none."""
+    if evaluation.brain_angle is None or evaluation.brain_angle_resultant is None:
+        return [], None
+    samples = np.abs(evaluation.brain_angle).argmax(axis=0)
+    return evaluation.brain_angle_resultant.tolist(), samples.T.tolist()
 
 
-def _peak_rows(kinematics: HeadKinematics, impacts: int) -> tuple[list[float] | None, ...]:
-    """Peak resultants of linear acceleration, angular velocity and angular acceleration, one per impact."""
-    k = kinematics
-    return (
-        None if k.linear_acceleration_g is None else _rows(k.peak_linear_acceleration_g, impacts),
-        None if k.angular_velocity is None else _rows(k.peak_angular_velocity, impacts),
-        None if k.angular_acceleration is None else _rows(k.peak_angular_acceleration, impacts),
-    )
-
-
-def _angle_rows(history: FloatArray | None, impacts: int) -> tuple[list[float], list[list[int]]] | None:
-    """Peak resultant brain angle of each impact, and the sample at which each axis peaks."""
-    if history is None:
-        return None
-    resultants = _rows(np.sqrt(largest(squared_norm(history))), impacts)
-    samples = np.abs(history).argmax(axis=0)
-    return resultants, [samples.tolist()] if history.ndim == 2 else samples.T.tolist()
+def _acceleration_peaks(motion: Motion) -> list[int]:
+    """The sample at which each impact's linear acceleration is largest; none where it was not recorded."""
+    row = motion.rows.linear_acceleration
+    return [] if row < 0 else motion.squared[:, row].argmax(axis=0).tolist()
 
 
 def _extra_score(extra: ExtraCriterion, kinematics: HeadKinematics) -> CriterionScore:
-    missing = set(extra.needs) - present_signals(kinematics)
+    missing = set(extra.needs) - set(kinematics.motion.signals)
     if missing:
         return CriterionScore(extra.key, None, extra.unit, reason=missing_reason(missing))
     found = extra.evaluate(kinematics)

@@ -48,9 +48,7 @@ def half_sine(duration_s: float, amplitude: float) -> Preparation:
     t = np.arange(round((duration_s + FREE_VIBRATION_S) * rate_hz) + 1) / rate_hz
     wave = np.where(t <= duration_s, amplitude * np.sin(np.pi * np.minimum(t / duration_s, 1.0)), 0.0)
     alpha = np.asfortranarray(np.repeat(wave[:, None], 3, axis=1))
-    return Preparation(
-        HeadKinematics(rate_hz, None, running_integral(alpha, rate_hz), alpha), (), (), None, None, False
-    )
+    return Preparation.of(HeadKinematics(rate_hz, None, running_integral(alpha, rate_hz), alpha))
 
 
 def velocity_change(duration_s: FloatArray, amplitude: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import pytest
 from exact_brain import exact_histories
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from waveforms import impact, rotation_matrix
+from waveforms import impact, rotation_matrix, values_of
 from waveforms import linear as linear_only
 from waveforms import rotational as rotation_only
 
@@ -48,7 +48,7 @@ def scaled(k: HeadKinematics, linear: np.ndarray | float, angular: np.ndarray | 
 
 
 def values(kinematics: HeadKinematics) -> dict[str, np.ndarray]:
-    return evaluate(kinematics).values
+    return values_of(kinematics)
 
 
 def windowed_maximum(x: np.ndarray, rate_hz: float, limit_s: float) -> float:
@@ -222,8 +222,9 @@ def test_rest_before_the_impact_changes_nothing_but_the_times(seed, samples, rat
         still = x.copy()
         still[0] = 0.0
         signals.append(still)
-    before = evaluate(HeadKinematics(rate_hz, *signals))
-    after = evaluate(HeadKinematics(rate_hz, *(np.concatenate((np.zeros((rest, 3)), x)) for x in signals)))
+    before = evaluate(HeadKinematics(rate_hz, *signals).motion)
+    later = HeadKinematics(rate_hz, *(np.concatenate((np.zeros((rest, 3)), x)) for x in signals))
+    after = evaluate(later.motion)
     for key in CRITERION_KEYS:
         np.testing.assert_allclose(after.values[key], before.values[key], rtol=1e-11, err_msg=key)
     for key, window in before.windows.items():

@@ -7,9 +7,8 @@ from math import exp, log, sqrt
 import numpy as np
 import pytest
 from damage_ode import damage_by_ode
-from waveforms import impact, rotational
+from waveforms import impact, rotational, values_of
 
-from headimpact.criteria import evaluate
 from headimpact.criteria.extra import EXTRA_CRITERIA
 from headimpact.errors import UnknownCriterion
 from headimpact.kinematics import HeadKinematics
@@ -22,7 +21,7 @@ def value(name: str, kinematics: HeadKinematics) -> float:
 
 
 def prepared(kinematics: HeadKinematics) -> Preparation:
-    return Preparation(kinematics, (), (), None, None, False)
+    return Preparation.of(kinematics)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -108,7 +107,7 @@ def test_brics_other_critical_sets_are_those_of_takhounts_2013(name, critical):
 def test_harm_and_hic_d_follow_their_formulas():
     # Bailey et al. 2020; 49 CFR 571.201
     kinematics = impact(5)
-    found = evaluate(kinematics).values
+    found = values_of(kinematics)
     assert value("harm", kinematics) == pytest.approx(
         0.0148 * float(found["hic15"]) + 15.6 * value("damage", kinematics), rel=1e-14
     )
@@ -131,7 +130,7 @@ def test_risk_weights_follow_their_curves_of_the_peak_resultant(name, signal, in
 
 def test_the_combined_risk_weight_is_vtcp():
     kinematics = impact(6)
-    assert value("rwe_combined", kinematics) == float(evaluate(kinematics).values["vtcp"])
+    assert value("rwe_combined", kinematics) == float(values_of(kinematics)["vtcp"])
 
 
 def test_extra_criteria_are_scored_by_name_only_and_stay_out_of_the_thirteen():

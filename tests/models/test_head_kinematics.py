@@ -95,9 +95,14 @@ def rigid_body(rate_hz: float, samples: int, offset_m: np.ndarray, inner: int = 
 OFFSET_M = np.array([0.071, -0.013, -0.068])
 
 
+def moved(a_g: np.ndarray, w: np.ndarray, alpha: np.ndarray, offset_m: np.ndarray) -> np.ndarray:
+    """The transfer of one impact, n x 3."""
+    return transfer_to_head_cg(a_g[..., None], w[..., None], alpha[..., None], offset_m)[..., 0]
+
+
 def test_the_transfer_gives_the_acceleration_of_the_centre_of_a_simulated_rigid_body():
     motion = rigid_body(1000.0, 200, OFFSET_M)
-    found = transfer_to_head_cg(motion["sensor"] / STANDARD_GRAVITY, motion["omega"], motion["alpha"], OFFSET_M)
+    found = moved(motion["sensor"] / STANDARD_GRAVITY, motion["omega"], motion["alpha"], OFFSET_M)
     expected = motion["centre"] / STANDARD_GRAVITY
     assert np.abs(motion["sensor"] - motion["centre"]).max() > 50  # m/s^2: there is something to move
     inner = slice(3, -3)
@@ -107,7 +112,7 @@ def test_the_transfer_gives_the_acceleration_of_the_centre_of_a_simulated_rigid_
 def test_the_opposite_sign_of_the_offset_would_double_the_error_instead():
     # "so does a wrong sign in the CG transfer" change the criteria
     motion = rigid_body(1000.0, 200, OFFSET_M)
-    wrong = transfer_to_head_cg(motion["sensor"] / STANDARD_GRAVITY, motion["omega"], motion["alpha"], -OFFSET_M)
+    wrong = moved(motion["sensor"] / STANDARD_GRAVITY, motion["omega"], motion["alpha"], -OFFSET_M)
     error = np.abs(wrong - motion["centre"] / STANDARD_GRAVITY).max()
     assert error > 1.9 * np.abs(motion["sensor"] - motion["centre"]).max() / STANDARD_GRAVITY
 
@@ -117,7 +122,7 @@ def test_a_head_that_only_spins_about_its_centre_has_no_acceleration_there():
     speed = 30.0
     omega = np.tile([0.0, 0.0, speed], (samples, 1))
     sensor = np.tile([-(speed**2) * 0.08, 0.0, 0.0], (samples, 1)) / STANDARD_GRAVITY
-    found = transfer_to_head_cg(sensor, omega, np.zeros((samples, 3)), np.array([0.08, 0.0, 0.0]))
+    found = moved(sensor, omega, np.zeros((samples, 3)), np.array([0.08, 0.0, 0.0]))
     np.testing.assert_allclose(found, 0, atol=1e-12)
 
 
@@ -204,4 +209,4 @@ def test_kinematics_without_a_signal_have_no_samples_and_say_what_is_missing():
     empty = HeadKinematics(1000.0, None, None, None)
     assert empty.samples == 0
     with pytest.raises(ValueError, match="linear_acceleration"):
-        _ = empty.linear_acceleration_squared
+        empty.motion.of("linear_acceleration")

@@ -60,7 +60,7 @@ def test_one_g_is_9_80665_metres_per_second_squared():
 def test_the_angular_acceleration_is_the_derivative_of_the_filtered_velocity():
     # filtered first, then differentiated
     found = prepare(Recording(angular_velocity=Signal(W, "rad/s", 1000.0)))
-    filtered = low_pass(W, corner_frequency(184.0, 1000.0), 1000.0)
+    filtered = low_pass(W.T, corner_frequency(184.0, 1000.0), 1000.0).T
     close(found.kinematics.angular_velocity, filtered)
     close(found.kinematics.angular_acceleration, differentiate(filtered, 1000.0))
     assert (found.angular_velocity_source, found.angular_acceleration_source) == ("supplied", "five_point_stencil")
@@ -98,10 +98,10 @@ def test_of_two_rates_each_is_filtered_and_differentiated_at_its_own_and_the_low
     # 80 samples at 1600 Hz end at 49.375 ms, the 99th step of 2000 Hz at 49.5 ms
     assert found.samples == 99
     time_s = np.arange(99) / 2000.0
-    filtered = low_pass(w, corner_frequency(184.0, 2000.0), 2000.0)
+    filtered = low_pass(w.T, corner_frequency(184.0, 2000.0), 2000.0).T
     close(found.angular_velocity, filtered[:99])
     close(found.angular_acceleration, differentiate(filtered, 2000.0)[:99])
-    slow = low_pass(a, corner_frequency(300.0, 1600.0), 1600.0)
+    slow = low_pass(a.T, corner_frequency(300.0, 1600.0), 1600.0).T
     close(found.linear_acceleration_g, interpolated(slow, 1600.0, time_s))
 
 
@@ -140,7 +140,7 @@ def test_stamps_that_jitter_are_resampled_before_anything_else():
     assert found.kinematics.sample_rate_hz == pytest.approx(rate_hz, rel=1e-15)
     even = np.linspace(time_s[0], time_s[-1], 100)
     resampled = np.stack([np.interp(even, time_s, W[:, i]) for i in range(3)], axis=1)
-    close(found.kinematics.angular_velocity, low_pass(resampled, corner_frequency(184.0, rate_hz), rate_hz))
+    close(found.kinematics.angular_velocity, low_pass(resampled.T, corner_frequency(184.0, rate_hz), rate_hz).T)
     assert codes(found) == ["resampled"]
 
 

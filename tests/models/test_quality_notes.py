@@ -11,7 +11,7 @@ from waveforms import burst, recording
 from headimpact.filtering import NO_FILTER
 from headimpact.kinematics import HeadKinematics, differentiate
 from headimpact.preparation import Preparation, prepare
-from headimpact.quality import QualityNote, check_truncation, check_units
+from headimpact.quality import QualityNote, check_truncation
 from headimpact.recording import Recording, Signal
 from headimpact.scoring import score
 
@@ -158,11 +158,15 @@ def with_ratio(ratio: float) -> HeadKinematics:
     return HeadKinematics(1000.0, a, None, alpha)
 
 
+def doubts(kinematics: HeadKinematics) -> list[str]:
+    return [note.code for note in score(Preparation.of(kinematics)).quality]
+
+
 @pytest.mark.parametrize(
     ("ratio", "noted"), [(0.1199, True), (0.1201, False), (1.0, False), (1.999, False), (2.001, True)]
 )
 def test_the_unit_check_accepts_ratios_from_0_12_to_2(ratio, noted):
-    assert [note.code for note in check_units(with_ratio(ratio))] == (["implausible_units"] if noted else [])
+    assert ("implausible_units" in doubts(with_ratio(ratio))) == noted
 
 
 @pytest.mark.parametrize(
@@ -185,9 +189,14 @@ def test_a_wrong_unit_is_noticed_and_nothing_is_guessed(signal, wrong):
 
 def test_the_unit_check_needs_both_signals_and_motion_in_both():
     whole = with_ratio(5.0)
-    assert list(check_units(replace(whole, angular_acceleration=None))) == []
-    assert list(check_units(replace(whole, linear_acceleration_g=None))) == []
-    assert list(check_units(replace(whole, angular_acceleration=np.zeros((100, 3))))) == []
+    assert "implausible_units" in doubts(whole)
+    for lacking in (
+        replace(whole, angular_acceleration=None),
+        replace(whole, linear_acceleration_g=None),
+        replace(whole, angular_acceleration=np.zeros((100, 3))),
+        replace(whole, linear_acceleration_g=np.zeros((100, 3))),
+    ):
+        assert "implausible_units" not in doubts(lacking)
 
 
 @pytest.mark.parametrize(
@@ -216,7 +225,7 @@ def test_a_linear_peak_at_the_edge_is_truncation(index, noted):
 def test_a_brain_angle_that_peaks_in_the_last_5_percent_is_truncation(peak, noted):
     # 100 samples: the last 5 % begin after sample 94.05
     kinematics = HeadKinematics(1000.0, None, None, np.ones((100, 3)))
-    found = list(check_truncation(kinematics, [40, peak, 0], pre_trigger_known=False))
+    found = list(check_truncation(kinematics.motion, None, [40, peak, 0], pre_trigger_known=False))
     assert bool(found) == noted
     if noted:
         assert "(y)" in found[0].detail

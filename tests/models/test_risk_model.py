@@ -260,7 +260,7 @@ def test_thresholds_shift_with_the_probabilities_so_that_who_exceeds_one_does_no
     here = resolve_operating_point(request, LAKSARI_2020, incidence)
     own = resolve_operating_point(request, LAKSARI_2020)
     for seed in range(30):
-        one = Preparation(impact(seed), (), (), None, None, False)
+        one = Preparation.of(impact(seed))
         shifted = score(one, incidence=incidence).criteria["bam"].probability
         plain = score(one).criteria["bam"].probability
         assert (shifted >= here.threshold) == (plain >= own.threshold)

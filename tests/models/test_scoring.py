@@ -14,16 +14,16 @@ from waveforms import burst, impact, recording
 from headimpact.criteria import CRITERIA, CRITERION_KEYS
 from headimpact.criteria.extra import EXTRA_CRITERIA
 from headimpact.kinematics import HeadKinematics
-from headimpact.preparation import Preparation, prepare
+from headimpact.preparation import BLOCK, Preparation, prepare
 from headimpact.recording import Recording, Signal
 from headimpact.risk import LAKSARI_2020, RiskModel
-from headimpact.scoring import BLOCK, CONVENTIONS, score, score_many
+from headimpact.scoring import CONVENTIONS, score, score_many
 
 SIGNALS = ("linear_acceleration_g", "angular_velocity", "angular_acceleration")
 
 
 def prepared(kinematics: HeadKinematics, pre_trigger_known: bool = False) -> Preparation:
-    return Preparation(kinematics, (), (), None, None, pre_trigger_known)
+    return Preparation.of(kinematics, pre_trigger_known=pre_trigger_known)
 
 
 def made_up(seed: int, samples: int, rate_hz: float, missing: tuple[str, ...] = ()) -> Preparation:

@@ -8,9 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from waveforms import burst, impact, pulse
 
-from headimpact.criteria import windows
-from headimpact.criteria.rotational import ric
-from headimpact.criteria.translational import hic15_and_hic36
+from headimpact.criteria import evaluate, windows
 from headimpact.criteria.windows import window_intervals, window_maxima
 
 LIMITS = (0.015, 0.036)
@@ -28,6 +26,12 @@ def brute_force(x: np.ndarray, rate_hz: float, limit_s: float) -> tuple[float, l
             found[start, stop] = duration * ((integral[stop] - integral[start]) / duration) ** 2.5
     best = max(found.values())
     return best, [window for window, value in found.items() if value >= best * (1 - 1e-12)]
+
+
+def maxima(x: np.ndarray, rate_hz: float, limits_s: tuple[float, ...], record: int = 0) -> list[tuple[float, int, int]]:
+    """Value, start and stop under each limit, of one record (n) or one of several (n x m)."""
+    found = window_maxima(x.reshape(x.shape[0], -1), rate_hz, limits_s)
+    return list(zip(*(part[:, record].tolist() for part in found), strict=True))
 
 
 def resultants(samples: int, rate_hz: float) -> dict[str, np.ndarray]:
@@ -52,23 +56,29 @@ SHAPES = list(resultants(40, 1000.0))
 )
 def test_value_and_window_are_those_of_every_window_tried(samples, rate_hz, shape):
     x = resultants(samples, rate_hz)[shape]
-    for limit_s, (value, start, stop) in zip(LIMITS, window_maxima(x, rate_hz, LIMITS), strict=True):
+    for limit_s, (value, start, stop) in zip(LIMITS, maxima(x, rate_hz, LIMITS), strict=True):
         expected, best = brute_force(x, rate_hz, limit_s)
-        assert float(value) == pytest.approx(expected, rel=1e-12)
-        assert expected == 0 or (int(start), int(stop)) in best
+        assert value == pytest.approx(expected, rel=1e-12)
+        assert expected == 0 or (start, stop) in best
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(("samples", "rate_hz"), [(5, 1000.0), (100, 1000.0), (160, 3200.0), (3000, 10_000.0)])
-def test_table_bound_and_block_searches_agree_to_the_bit(monkeypatch, samples, rate_hz, shape):
+def test_table_bound_and_length_searches_agree_to_the_bit(monkeypatch, samples, rate_hz, shape):
     x = resultants(samples, rate_hz)[shape]
     found = {}
-    for name, size, signal in (("table", 1e9, x), ("bound", 0, x), ("block", 1e9, x[:, None]), ("many", 0, x[:, None])):
+    for name, size, few in (("table", 1e9, 20), ("bound", 0, 20), ("length", 1e9, 0)):
         monkeypatch.setattr(windows, "TABLE_SIZE", size)
-        found[name] = [
-            tuple(np.atleast_1d(part).tolist() for part in one) for one in window_maxima(signal, rate_hz, LIMITS)
-        ]
-    assert found["table"] == found["bound"] == found["block"] == found["many"]
+        monkeypatch.setattr(windows, "FEW", few)
+        found[name] = maxima(x, rate_hz, LIMITS)
+    assert found["table"] == found["bound"] == found["length"]
+
+
+def test_every_record_of_many_has_the_window_it_has_alone():
+    x = np.stack(list(resultants(100, 1000.0).values()) * 5, axis=1)
+    assert x.shape[1] > windows.FEW
+    for record in range(x.shape[1]):
+        assert maxima(x, 1000.0, LIMITS, record) == maxima(x[:, record], 1000.0, LIMITS)
 
 
 @given(
@@ -79,37 +89,36 @@ def test_table_bound_and_block_searches_agree_to_the_bit(monkeypatch, samples, r
 def test_searches_agree_to_the_bit_where_many_windows_are_equal(levels, rate_hz):
     # small whole numbers: ties everywhere
     x = np.array(levels, dtype=float)
-    kept = windows.TABLE_SIZE
-    try:
-        windows.TABLE_SIZE = 10**9
-        table, block = window_maxima(x, rate_hz, LIMITS), window_maxima(np.stack([x, x[::-1]], axis=1), rate_hz, LIMITS)
-        windows.TABLE_SIZE = 0
-        bound = window_maxima(x, rate_hz, LIMITS)
-    finally:
-        windows.TABLE_SIZE = kept
-    for one, other, both in zip(table, bound, block, strict=True):
-        assert [float(part) for part in one] == [float(part) for part in other]
-        assert [float(part) for part in one] == [float(part[0]) for part in both]
-        expected, best = brute_force(x, rate_hz, LIMITS[table.index(one)])
-        assert float(one[0]) == pytest.approx(expected, rel=1e-12)
-        assert not x.any() or (int(one[1]), int(one[2])) in best
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(windows, "TABLE_SIZE", 10**9)
+        table = maxima(x, rate_hz, LIMITS)
+        patch.setattr(windows, "FEW", 0)
+        length = maxima(np.stack([x, x[::-1]], axis=1), rate_hz, LIMITS)
+        patch.setattr(windows, "TABLE_SIZE", 0)
+        bound = maxima(x, rate_hz, LIMITS)
+    assert table == bound == length
+    for (value, start, stop), limit_s in zip(table, LIMITS, strict=True):
+        expected, best = brute_force(x, rate_hz, limit_s)
+        assert value == pytest.approx(expected, rel=1e-12)
+        assert not x.any() or (start, stop) in best
 
 
 def test_of_equal_windows_the_earliest_is_given():
     # whole numbers at 1024 Hz: both pulses' integrals are exact, and so equal
     x = np.zeros(100)
     x[10:17] = x[60:67] = [8, 24, 40, 48, 40, 24, 8]
-    for found in (window_maxima(x, 1024.0, (0.015,)), window_maxima(x[:, None], 1024.0, (0.015,))):
-        (_, start, stop) = found[0]
-        assert (int(np.squeeze(start)), int(np.squeeze(stop))) == (11, 15)
+    for few in (20, 0):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(windows, "FEW", few)
+            ((_, start, stop),) = maxima(x, 1024.0, (0.015,))
+        assert (start, stop) == (11, 15)
 
 
 def test_a_record_without_motion_has_value_zero_and_no_window():
-    for x in (np.zeros(50), np.zeros((50, 4))):
-        for value, start, stop in window_maxima(x, 1000.0, LIMITS):
-            assert not np.any(value)
-            assert not np.any(start)
-            assert not np.any(stop)
+    for records in (1, 4, 40):
+        for part in window_maxima(np.zeros((50, records)), 1000.0, LIMITS):
+            assert part.shape == (2, records)
+            assert not part.any()
 
 
 @pytest.mark.parametrize(
@@ -137,24 +146,25 @@ def test_a_window_never_exceeds_the_record():
 def test_windows_may_be_as_long_as_the_limit(limit_ms):
     # 49 CFR 571.208: "not more than 15 ms apart"; the paper prints "<" (misprint 2)
     x = np.full(100, 50.0)
-    value, start, stop = window_maxima(x, 1000.0, (limit_ms / 1000,))[0]
-    assert int(stop) - int(start) == limit_ms
-    assert float(value) == pytest.approx(50.0**2.5 * limit_ms / 1000, rel=1e-12)
+    ((value, start, stop),) = maxima(x, 1000.0, (limit_ms / 1000,))
+    assert stop - start == limit_ms
+    assert value == pytest.approx(50.0**2.5 * limit_ms / 1000, rel=1e-12)
 
 
 def test_with_a_strict_limit_a_square_pulses_hic15_would_read_7_percent_lower_at_1_khz():
     # what misprint 2 costs: a square pulse longer than the limit loses one interval of fifteen
     x = np.full(100, 50.0)
-    inclusive, strict = (float(window_maxima(x, 1000.0, (limit,))[0][0]) for limit in (0.015, 0.014))
+    inclusive, strict = (maxima(x, 1000.0, (limit,))[0][0] for limit in (0.015, 0.014))
     assert strict / inclusive == pytest.approx(14 / 15)
 
 
 def test_hic_is_positive_although_the_paper_prints_one_over_t1_minus_t2():
     # misprint 2: as printed, (negative mean)^2.5 is no real number
-    kinematics = impact(4)
-    for value, start, stop in [*hic15_and_hic36(kinematics), ric(kinematics)]:
-        assert float(value) > 0
-        assert int(start) < int(stop)
+    found = evaluate(impact(4).motion)
+    for key in ("hic15", "hic36", "ric"):
+        start, stop = found.windows[key]
+        assert found.values[key] > 0
+        assert start < stop
 
 
 @pytest.mark.campaign
@@ -164,6 +174,6 @@ def test_the_bound_search_equals_the_table_on_long_records_at_high_rates(monkeyp
     rate_hz, samples = float(generator.choice([10_000.0, 20_000.0])), int(generator.integers(1000, 20_001))
     x = np.linalg.norm(burst(generator, samples, 40.0, rate_hz), axis=1) + np.abs(generator.normal(0, 2, samples))
     monkeypatch.setattr(windows, "TABLE_SIZE", 0)
-    bound = window_maxima(x, rate_hz, LIMITS)
+    bound = maxima(x, rate_hz, LIMITS)
     monkeypatch.setattr(windows, "TABLE_SIZE", 10**12)
-    assert bound == window_maxima(x, rate_hz, LIMITS)
+    assert bound == maxima(x, rate_hz, LIMITS)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from headimpact.criteria import evaluate
 from headimpact.kinematics import HeadKinematics
 from headimpact.recording import Recording, Signal
 
@@ -45,6 +46,11 @@ def linear(acceleration_g: FloatArray, rate_hz: float) -> HeadKinematics:
 def rotational(alpha: FloatArray, rate_hz: float, omega: FloatArray | None = None) -> HeadKinematics:
     """Kinematics with rotation only."""
     return HeadKinematics(rate_hz, None, omega, alpha)
+
+
+def values_of(kinematics: HeadKinematics) -> dict[str, FloatArray]:
+    """The criteria of one impact: a value, or three."""
+    return {key: found[..., 0] for key, found in evaluate(kinematics.motion).values.items()}
 
 
 def burst(generator: np.random.Generator, samples: int, scale: float, rate_hz: float = 1000.0) -> FloatArray:

@@ -4,53 +4,70 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
+from headimpact.brain import peaks_of
 from headimpact.criteria import combined, rotational, translational
-from headimpact.criteria.windows import FloatArray, IntArray
-from headimpact.kinematics import HeadKinematics, largest_magnitude
+from headimpact.criteria.windows import IntArray, WindowMaxima, window_maxima
+from headimpact.kinematics import FloatArray, Motion
 from headimpact.recording import SignalName
 
-Window = tuple[IntArray, IntArray]
+LIMITS_S = (translational.HIC15_LIMIT_S, translational.HIC36_LIMIT_S)
+"""Longest windows of HIC and RIC [s]: RIC's is that of HIC36, so that one pass finds them all."""
+assert rotational.RIC_LIMIT_S == translational.HIC36_LIMIT_S
 
 
-@dataclass(slots=True)
+@dataclass
 class Evaluation:
-    """Values of criteria, by key, as they are computed: one value or one per axis for each impact."""
+    """Criteria of m impacts, by key, as they are computed: m values, or 3 x m of them, one per axis."""
 
-    kinematics: HeadKinematics
+    motion: Motion
     values: dict[str, FloatArray] = field(default_factory=dict)
-    windows: dict[str, Window] = field(default_factory=dict)
+    windows: dict[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
     brain_angle: FloatArray | None = None
+    """At every sample, n x 3 x m [rad]."""
+    brain_angle_resultant: FloatArray | None = None
+    """Its largest norm, m [rad]."""
+
+    def take_window(self, key: str, limit: int, acceleration: int) -> None:
+        """A criterion of HIC's form, with its window: under which of :data:`LIMITS_S`, of which acceleration."""
+        at = (limit, acceleration)
+        self.values[key] = self._maxima.value[at]
+        self.windows[key] = (self._maxima.start[at], self._maxima.stop[at])
+
+    @cached_property
+    def _maxima(self) -> WindowMaxima:
+        """The windowed maxima of the accelerations that are there, found in one pass: limits x accelerations x m."""
+        resultants = self.motion.resultants[:, self.motion.rows.accelerations]
+        n, accelerations, m = resultants.shape
+        found = window_maxima(resultants.reshape(n, -1), self.motion.sample_rate_hz, LIMITS_S)
+        shape = (len(LIMITS_S), accelerations, m)
+        return WindowMaxima(found.value.reshape(shape), found.start.reshape(shape), found.stop.reshape(shape))
 
 
 def _rotation(evaluation: Evaluation) -> None:
-    evaluation.values["peak_angular_acceleration"] = rotational.peak_angular_acceleration(evaluation.kinematics)
-    value, start, stop = rotational.ric(evaluation.kinematics)
-    evaluation.values["ric"] = value
-    evaluation.windows["ric"] = (start, stop)
-    evaluation.brain_angle = rotational.brain_angle(evaluation.kinematics)
-    evaluation.values["bam"] = largest_magnitude(evaluation.brain_angle)
+    evaluation.values["peak_angular_acceleration"] = rotational.peak_angular_acceleration(evaluation.motion)
+    evaluation.take_window("ric", 1, -1)
+    evaluation.brain_angle = rotational.brain_angle(evaluation.motion)
+    evaluation.values["bam"], evaluation.brain_angle_resultant = peaks_of(evaluation.brain_angle)
 
 
 def _velocity(evaluation: Evaluation) -> None:
-    evaluation.values["delta_angular_velocity"] = rotational.delta_angular_velocity(evaluation.kinematics)
-    evaluation.values["bric"] = rotational.bric(evaluation.kinematics)
+    evaluation.values["delta_angular_velocity"] = rotational.delta_angular_velocity(evaluation.motion)
+    evaluation.values["bric"] = rotational.bric(evaluation.motion)
 
 
 def _translation(evaluation: Evaluation) -> None:
-    evaluation.values["peak_linear_acceleration"] = translational.peak_linear_acceleration(evaluation.kinematics)
-    for key, (value, start, stop) in zip(
-        ("hic15", "hic36"), translational.hic15_and_hic36(evaluation.kinematics), strict=True
-    ):
-        evaluation.values[key] = value
-        evaluation.windows[key] = (start, stop)
-    evaluation.values["si"] = translational.severity_index(evaluation.kinematics)
+    evaluation.values["peak_linear_acceleration"] = translational.peak_linear_acceleration(evaluation.motion)
+    evaluation.take_window("hic15", 0, 0)
+    evaluation.take_window("hic36", 1, 0)
+    evaluation.values["si"] = translational.severity_index(evaluation.motion)
 
 
 def _combination(evaluation: Evaluation) -> None:
-    evaluation.values["hip"], evaluation.values["hip3d"] = combined.head_impact_power(evaluation.kinematics)
-    evaluation.values["gambit"] = combined.gambit(evaluation.kinematics)
-    evaluation.values["vtcp"] = combined.vtcp(evaluation.kinematics)
+    evaluation.values["hip"], evaluation.values["hip3d"] = combined.head_impact_power(evaluation.motion)
+    evaluation.values["gambit"] = combined.gambit(evaluation.motion)
+    evaluation.values["vtcp"] = combined.vtcp(evaluation.motion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,32 +120,22 @@ CRITERION_KEYS: tuple[str, ...] = tuple(criterion.key for criterion in CRITERIA)
 BY_KEY: dict[str, Criterion] = {criterion.key: criterion for criterion in CRITERIA}
 
 
-def present_signals(kinematics: HeadKinematics) -> frozenset[str]:
-    """Names of the signals that the kinematics hold."""
-    held = {
-        "linear_acceleration": kinematics.linear_acceleration_g,
-        "angular_velocity": kinematics.angular_velocity,
-        "angular_acceleration": kinematics.angular_acceleration,
-    }
-    return frozenset(name for name, array in held.items() if array is not None)
-
-
-def evaluate(kinematics: HeadKinematics) -> Evaluation:
+def evaluate(motion: Motion) -> Evaluation:
     """Every criterion that the recorded signals allow.
 
     Parameters
     ----------
-    kinematics
-        Motion of one impact (n x 3) or of a block of m impacts (n x 3 x m).
+    motion
+        Of m impacts.
 
     Returns
     -------
     Evaluation
-        `values` by key, shaped () or (3,) for one impact, (m,) or (3, m) for a block; a criterion whose signals are
-        absent is absent. `windows` of HIC and RIC as sample numbers; `brain_angle` the history at the samples [rad].
+        `values` by key, m or 3 x m; a criterion whose signals are absent is absent. `windows` of HIC and RIC as sample
+        numbers; the history of the brain angle at the samples [rad].
     """
-    evaluation = Evaluation(kinematics)
-    present = present_signals(kinematics)
+    evaluation = Evaluation(motion)
+    present = set(motion.signals)
     for family in (ROTATION, VELOCITY, TRANSLATION, COMBINATION):
         if present.issuperset(family.needs):
             family.evaluate(evaluation)

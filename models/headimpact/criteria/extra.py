@@ -9,10 +9,9 @@ from math import exp, sqrt
 import numpy as np
 
 from headimpact.brain import Oscillators, peak_brain_angles
-from headimpact.criteria import rotational, translational
+from headimpact.criteria import evaluate, rotational
 from headimpact.criteria.combined import vtcp
-from headimpact.criteria.windows import FloatArray
-from headimpact.kinematics import HeadKinematics
+from headimpact.kinematics import FloatArray, HeadKinematics
 from headimpact.published import EXTRA_CONSTANTS
 from headimpact.recording import SignalName
 
@@ -58,9 +57,9 @@ def _ubric(kinematics: HeadKinematics, velocity: FloatArray) -> ExtraValue:
     constants = EXTRA_CONSTANTS["ubric_mps"]
     total = 0.0
     for w, w_critical, a, a_critical in zip(
-        velocity,
+        velocity[:, 0],
         constants["critical_angular_velocity_rad_s"],
-        kinematics.peak_angular_acceleration_components,
+        rotational.peak_angular_acceleration(kinematics.motion)[:, 0],
         constants["critical_angular_acceleration_rad_s2"],
         strict=True,
     ):
@@ -73,17 +72,17 @@ def _ubric(kinematics: HeadKinematics, velocity: FloatArray) -> ExtraValue:
 
 def ubric_mps(kinematics: HeadKinematics) -> ExtraValue:
     """UBrIC (Gabler et al. 2018) with strain criticals, velocity = largest absolute value [-]."""
-    return _ubric(kinematics, kinematics.peak_angular_velocity_components)
+    return _ubric(kinematics, rotational.peak_angular_velocity(kinematics.motion))
 
 
 def ubric_mps_peak_to_peak(kinematics: HeadKinematics) -> ExtraValue:
     """The same with velocity = largest minus smallest value: sources disagree, so the choice is in the name [-]."""
-    return _ubric(kinematics, rotational.delta_angular_velocity(kinematics))
+    return _ubric(kinematics, rotational.delta_angular_velocity(kinematics.motion))
 
 
 def _bric(kinematics: HeadKinematics, name: str) -> ExtraValue:
     critical = np.array(EXTRA_CONSTANTS[name]["critical_angular_velocity_rad_s"])
-    return ExtraValue(float(rotational.bric(kinematics, critical)))
+    return ExtraValue(float(rotational.bric(kinematics.motion, critical)[0]))
 
 
 def bric_mps(kinematics: HeadKinematics) -> ExtraValue:
@@ -99,14 +98,24 @@ def bric_average(kinematics: HeadKinematics) -> ExtraValue:
 def harm(kinematics: HeadKinematics) -> ExtraValue:
     """Head acceleration response metric (Bailey et al. 2020), from HIC15 and DAMAGE [-]."""
     constants = EXTRA_CONSTANTS["harm"]
-    (hic15, _, _), _ = translational.hic15_and_hic36(kinematics)
-    return ExtraValue(constants["hic15"] * float(hic15) + constants["damage"] * damage(kinematics).value)
+    return ExtraValue(constants["hic15"] * _value("hic15", kinematics) + constants["damage"] * damage(kinematics).value)
 
 
 def hic_d(kinematics: HeadKinematics) -> ExtraValue:
     """HIC(d) of the free-motion headform (49 CFR 571.201), from HIC36 [g^2.5 s]."""
-    _, (hic36, _, _) = translational.hic15_and_hic36(kinematics)
-    return ExtraValue(EXTRA_CONSTANTS["hic_d"]["slope"] * float(hic36) + EXTRA_CONSTANTS["hic_d"]["offset"])
+    constants = EXTRA_CONSTANTS["hic_d"]
+    return ExtraValue(constants["slope"] * _value("hic36", kinematics) + constants["offset"])
+
+
+def _value(key: str, kinematics: HeadKinematics) -> float:
+    """One of the thirteen."""
+    return float(evaluate(kinematics.motion).values[key][0])
+
+
+def _peak(signal: SignalName, kinematics: HeadKinematics) -> float:
+    """The largest norm of a signal, in its unit."""
+    motion = kinematics.motion
+    return float(motion.peaks[motion.signals.index(signal)][0])
 
 
 def _risk_weight(name: str, peak: float) -> ExtraValue:
@@ -116,22 +125,22 @@ def _risk_weight(name: str, peak: float) -> ExtraValue:
 
 def rwe_linear_collegiate(kinematics: HeadKinematics) -> ExtraValue:
     """This impact's share of the linear risk-weighted exposure, collegiate curve (Urban et al. 2013) [-]."""
-    return _risk_weight("rwe_linear_collegiate", float(kinematics.peak_linear_acceleration_g))
+    return _risk_weight("rwe_linear_collegiate", _peak("linear_acceleration", kinematics))
 
 
 def rwe_linear_nfl(kinematics: HeadKinematics) -> ExtraValue:
     """This impact's share of the linear risk-weighted exposure, NFL curve (Urban et al. 2013) [-]."""
-    return _risk_weight("rwe_linear_nfl", float(kinematics.peak_linear_acceleration_g))
+    return _risk_weight("rwe_linear_nfl", _peak("linear_acceleration", kinematics))
 
 
 def rwe_rotational(kinematics: HeadKinematics) -> ExtraValue:
     """This impact's share of the rotational risk-weighted exposure (Urban et al. 2013) [-]."""
-    return _risk_weight("rwe_rotational", float(kinematics.peak_angular_acceleration))
+    return _risk_weight("rwe_rotational", _peak("angular_acceleration", kinematics))
 
 
 def rwe_combined(kinematics: HeadKinematics) -> ExtraValue:
     """This impact's share of the combined risk-weighted exposure: the paper's VTCP [-]."""
-    return ExtraValue(float(vtcp(kinematics)))
+    return ExtraValue(float(vtcp(kinematics.motion)[0]))
 
 
 @dataclass(frozen=True, slots=True)

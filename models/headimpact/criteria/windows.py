@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import floor, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,10 @@ from headimpact.kinematics import running_integral
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-# Above this many candidate windows, one impact is searched by branch and bound instead of in one table.
+# Above this many candidate windows, a record is searched by branch and bound instead of in one table.
 TABLE_SIZE = 20_000
+# Below this many records, one table holds the windows of all.
+FEW = 20
 
 
 def window_intervals(limit_s: float, sample_rate_hz: float, samples: int) -> int:
@@ -27,15 +30,21 @@ def window_intervals(limit_s: float, sample_rate_hz: float, samples: int) -> int
     return min(floor(limit_s * sample_rate_hz + 1e-6), samples - 1)
 
 
-def window_maxima(
-    x: FloatArray, sample_rate_hz: float, limits_s: tuple[float, ...]
-) -> list[tuple[FloatArray, IntArray, IntArray]]:
+class WindowMaxima(NamedTuple):
+    """Largest windowed values, limits x m, and the samples at which their windows start and stop."""
+
+    value: FloatArray
+    start: IntArray
+    stop: IntArray
+
+
+def window_maxima(x: FloatArray, sample_rate_hz: float, limits_s: tuple[float, ...]) -> WindowMaxima:
     """The largest windowed value under each limit.
 
     Parameters
     ----------
     x
-        A resultant, not negative, time first: n, or n x m for a block of impacts.
+        Resultants, not negative, time first: n x m.
     sample_rate_hz
         Samples per second [Hz].
     limits_s
@@ -43,27 +52,22 @@ def window_maxima(
 
     Returns
     -------
-    list of (value, start, stop)
-        Per limit; value in (unit of x)^2.5 s, start and stop as sample numbers. Of equal windows, the shortest and then
-        the earliest. A record without any motion has value 0 and the window (0, 0).
+    WindowMaxima
+        Values in (unit of x)^2.5 s, starts and stops as sample numbers. Of equal windows, the shortest and then the
+        earliest. A record without any motion has value 0 and the window (0, 0).
     """
-    integral = running_integral(x, sample_rate_hz)
-    lengths = [window_intervals(limit, sample_rate_hz, x.shape[0]) for limit in limits_s]
-    if x.ndim == 1:
-        return [_as_arrays(found) for found in _single(integral, sample_rate_hz, lengths)]
-    if lengths[-1] * x.shape[0] > TABLE_SIZE:
-        columns = [_single(np.ascontiguousarray(column), sample_rate_hz, lengths) for column in integral.T]
-        return [_stack([column[i] for column in columns]) for i in range(len(lengths))]
-    return _block(integral, sample_rate_hz, lengths)
+    return maxima_of_integral(running_integral(x, sample_rate_hz), sample_rate_hz, limits_s)
 
 
-def _as_arrays(found: tuple[float, int, int]) -> tuple[FloatArray, IntArray, IntArray]:
-    return np.float64(found[0]), np.intp(found[1]), np.intp(found[2])  # type: ignore[return-value] # 0-d
-
-
-def _stack(found: list[tuple[float, int, int]]) -> tuple[FloatArray, IntArray, IntArray]:
-    value, start, stop = zip(*found, strict=True)
-    return np.array(value), np.array(start, dtype=np.intp), np.array(stop, dtype=np.intp)
+def maxima_of_integral(integral: FloatArray, sample_rate_hz: float, limits_s: tuple[float, ...]) -> WindowMaxima:
+    """The same from the running integral of the resultants, n x m."""
+    n, m = integral.shape
+    lengths = [window_intervals(limit, sample_rate_hz, n) for limit in limits_s]
+    if lengths[-1] * n > TABLE_SIZE:
+        return _by_bound(integral, sample_rate_hz, lengths)
+    if m < FEW:
+        return _by_table(integral, sample_rate_hz, lengths)
+    return _by_length(integral, sample_rate_hz, lengths)
 
 
 def _value(m: FloatArray, duration_to_1_5: FloatArray) -> FloatArray:
@@ -80,10 +84,8 @@ def _durations(longest: int, sample_rate_hz: float) -> FloatArray:
     return durations
 
 
-def _block(
-    integral: FloatArray, sample_rate_hz: float, lengths: list[int]
-) -> list[tuple[FloatArray, IntArray, IntArray]]:
-    """Every window length of a block of impacts: subtract and take the maximum, once per length."""
+def _by_length(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> WindowMaxima:
+    """Every window length of many records: subtract and take the maximum, once per length."""
     n, m = integral.shape
     longest = lengths[-1]
     largest = np.empty((longest, m))
@@ -92,27 +94,45 @@ def _block(
         rows = np.subtract(integral[k:], integral[:-k], out=difference[: n - k])
         np.maximum.reduce(rows, axis=0, out=largest[k - 1])
     values = _value(largest, _durations(longest, sample_rate_hz)[:, None])
-    results = []
-    for length in lengths:
-        best = values[:length].argmax(axis=0)
-        results.append(_locate(integral, values[best, np.arange(m)], best + 1))
-    return results
+    best = np.stack([values[:length].argmax(axis=0) for length in lengths])
+    start = np.stack([_first_largest(integral, k + 1) for k in best])
+    return _found(values[best, np.arange(m)], start, best + 1)
 
 
-def _locate(integral: FloatArray, value: FloatArray, k: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
-    """The first start whose window of k intervals has the largest integral, for each impact of a block."""
+def _first_largest(integral: FloatArray, k: IntArray) -> IntArray:
+    """The first start whose window of k intervals has the largest integral, for each record."""
     n = integral.shape[0]
-    rows = np.arange(n)[:, None] + k
-    ends = np.take_along_axis(integral, np.minimum(rows, n - 1), axis=0)
-    start = np.where(rows < n, ends - integral, -1.0).argmax(axis=0)
+    ends = np.arange(n)[:, None] + k
+    at_end = np.take_along_axis(integral, np.minimum(ends, n - 1), axis=0)
+    found: IntArray = np.where(ends < n, at_end - integral, -1.0).argmax(axis=0)
+    return found
+
+
+def _found(value: FloatArray, start: IntArray, k: IntArray) -> WindowMaxima:
+    """Windows of k intervals, none where nothing moved."""
     moved = value > 0
-    return value, np.where(moved, start, 0), np.where(moved, start + k, 0)
+    return WindowMaxima(value, start * moved, (start + k) * moved)
 
 
-def _single(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> list[tuple[float, int, int]]:
-    if lengths[-1] * integral.size <= TABLE_SIZE:
-        return _single_by_table(integral, sample_rate_hz, lengths)
-    return _single_by_bound(integral, sample_rate_hz, lengths)
+def _by_table(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> WindowMaxima:
+    """All windows of a few short records in one table, a row per length.
+
+    Each integral is continued by its last value. A window that overhangs the end is then a longer one with the same
+    integral as the window that stops there, so it never wins.
+    """
+    n, m = integral.shape
+    longest = lengths[-1]
+    continued = np.empty((m, n + longest))
+    continued[:, :n] = integral.T
+    continued[:, n:] = continued[:, n - 1 : n]
+    step = continued.itemsize
+    strides = (continued.strides[0], step, step)
+    ends = np.ndarray((m, longest, n - 1), np.float64, continued, step, strides)
+    integrals = ends - continued[:, None, : n - 1]
+    values = _value(np.maximum.reduce(integrals, axis=2), _durations(longest, sample_rate_hz))
+    best = np.array([values[:, :length].argmax(axis=1) for length in lengths])
+    records = np.arange(m)
+    return _found(values[records, best], integrals[records, best].argmax(axis=2), best + 1)
 
 
 def _window(integral: FloatArray, value: float, k: int) -> tuple[float, int, int]:
@@ -122,29 +142,15 @@ def _window(integral: FloatArray, value: float, k: int) -> tuple[float, int, int
     return value, start, start + k
 
 
-def _single_by_table(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> list[tuple[float, int, int]]:
-    """All windows of a short record in one table, a row per length.
-
-    The integral is continued by its last value. A window that overhangs the end is then a longer one with the same
-    integral as the window that stops there, so it never wins.
-    """
-    longest = lengths[-1]
-    continued = np.empty(integral.size + longest)
-    continued[: integral.size] = integral
-    continued[integral.size :] = integral[-1]
-    step = continued.itemsize
-    ends = np.ndarray((longest, integral.size - 1), np.float64, continued, step, (step, step))
-    largest = np.maximum.reduce(ends - integral[:-1], axis=1)
-    values = _value(largest, _durations(longest, sample_rate_hz))
-    found = []
-    for length in lengths:
-        best = int(values[:length].argmax())
-        found.append(_window(integral, float(values[best]), best + 1))
-    return found
+def _by_bound(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> WindowMaxima:
+    """Long records at high rates, one by one."""
+    found = [_one_by_bound(column, sample_rate_hz, lengths) for column in np.ascontiguousarray(integral.T)]
+    value, start, stop = np.array(found).transpose(2, 1, 0)
+    return WindowMaxima(value, start.astype(np.intp), stop.astype(np.intp))
 
 
-def _single_by_bound(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> list[tuple[float, int, int]]:
-    """Branch and bound over the window length, for long records at high rates.
+def _one_by_bound(integral: FloatArray, sample_rate_hz: float, lengths: list[int]) -> list[tuple[float, int, int]]:
+    """Branch and bound over the window length.
 
     M(k) never falls with k, so over the lengths a..b no value exceeds M(b)^2.5 / (a dt)^1.5. Spans whose bound is below
     the best value found are dropped, the others are halved: the cost grows like the rate, not like its square.

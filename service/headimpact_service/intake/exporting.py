@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic_core import to_json
 
-from headimpact.preparation import TO_CRITERIA_UNIT
-from headimpact.recording import AXES, FloatArray
+from headimpact.recording import AXES, TO_CRITERIA_UNIT, FloatArray
 from headimpact_service.ingest.impact_json import Context
 from headimpact_service.intake.records import TIME, kinematics_document, raw_traces, thousandfold
 from headimpact_service.store import ids

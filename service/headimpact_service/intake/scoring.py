@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from headimpact.criteria.extra import EXTRA_CRITERIA
 from headimpact.errors import OperatingPointUnreachable, TraceError
-from headimpact.preparation import Preparation, prepare
+from headimpact.preparation import Preparation, prepare, prepare_many
 from headimpact.quality import QualityNote
 from headimpact.recording import Mounting, Recording, Signal
 from headimpact.risk import (
@@ -70,53 +70,59 @@ def score_record(record: ImpactRecord, terms: Terms, device: DeviceFacts = UNKNO
     Problem
         422 for a record that breaks a rule, or that asks for what the model does not have.
     """
-    unscored = _prepared(record, terms, device)
-    if unscored.preparation is None:
-        return unscored
-    found = score(
-        unscored.preparation, terms.model, incidence=terms.incidence, extra_criteria=unscored.record.extra_criteria
-    )
-    return replace(unscored, score=found)
+    asked = _asked(record, terms, device)
+    if asked.reasons:
+        return asked
+    try:
+        preparation = prepare(asked.record.recording)
+    except TraceError as error:
+        raise trace_problem(error) from None
+    found = score(preparation, terms.model, incidence=terms.incidence, extra_criteria=asked.record.extra_criteria)
+    return replace(asked, preparation=preparation, score=found)
 
 
 def score_records(records: Sequence[tuple[ImpactRecord, DeviceFacts]], terms: Terms) -> list[Scored | Problem]:
     """Score many records together, with the same digits as one by one; what is wrong with one stands in its place."""
-    unscored = [_prepared_or_problem(record, terms, device) for record, device in records]
+    results = _prepared([_asked_or_problem(record, terms, device) for record, device in records])
     batches: dict[tuple[str, ...], list[int]] = {}
-    for index, item in enumerate(unscored):
+    for index, item in enumerate(results):
         if isinstance(item, Scored) and item.preparation is not None:
             batches.setdefault(item.record.extra_criteria, []).append(index)
     for extra, members in batches.items():
-        ready = [item for index in members if isinstance(item := unscored[index], Scored)]
+        ready = [item for index in members if isinstance(item := results[index], Scored)]
         preparations = [item.preparation for item in ready if item.preparation is not None]
         found = score_many(preparations, terms.model, incidence=terms.incidence, extra_criteria=extra)
         for index, item, result in zip(members, ready, found, strict=True):
-            unscored[index] = replace(item, score=result)
-    return unscored
+            results[index] = replace(item, score=result)
+    return results
 
 
-def _prepared_or_problem(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored | Problem:
+def _prepared(results: list[Scored | Problem]) -> list[Scored | Problem]:
+    """Those that are to be scored with their preparation, or the problem that it met."""
+    members = [index for index, item in enumerate(results) if isinstance(item, Scored) and not item.reasons]
+    recordings = [item.record.recording for index in members if isinstance(item := results[index], Scored)]
+    for index, found in zip(members, prepare_many(recordings), strict=True):
+        item = results[index]
+        assert isinstance(item, Scored)
+        results[index] = trace_problem(found) if isinstance(found, TraceError) else replace(item, preparation=found)
+    return results
+
+
+def _asked_or_problem(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored | Problem:
     try:
-        return _prepared(record, terms, device)
+        return _asked(record, terms, device)
     except Problem as problem:
         return problem
 
 
-def _prepared(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored:
-    """Everything but the score itself."""
+def _asked(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored:
+    """What is asked of a record, with what its device adds; not prepared yet, and never if there are reasons."""
     points = operating_points(record.operating_points, terms)
     _require_known(record.extra_criteria)
     record = with_device(record, device)
     if record.context.get("worn") is False:
         record = replace(record, notes=(*record.notes, NOT_WORN))
-    digest = digest_bytes(input_digest(record))
-    if record.unscorable:
-        return Scored(record, terms, None, None, points, record.unscorable, digest)
-    try:
-        preparation = prepare(record.recording)
-    except TraceError as error:
-        raise trace_problem(error) from None
-    return Scored(record, terms, None, preparation, points, (), digest)
+    return Scored(record, terms, None, None, points, record.unscorable, digest_bytes(input_digest(record)))
 
 
 def _require_known(extra_criteria: Sequence[str]) -> None:

@@ -1,0 +1,86 @@
+"""One time base for signals of different rates and starts: the samples of the fastest within the overlap of all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import ceil, floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from headimpact.errors import TraceError
+from headimpact.published import QUALITY_LIMITS
+from headimpact.recording import FloatArray, SignalName
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Uniform samples of a signal: `start_s` is the first one's time on the clock that the signals share."""
+
+    samples: int
+    rate_hz: float
+    start_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Onto:
+    """How samples become those of the base: interpolated linearly from `before` to the one after by `share`."""
+
+    before: NDArray[np.intp]
+    share: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class TimeBase:
+    """The samples that signals are brought to, and for each signal how: a slice of its own, or between them."""
+
+    rate_hz: float
+    start_s: float
+    samples: int
+    ways: Mapping[SignalName, slice | Onto]
+
+    @property
+    def keeps_all(self) -> bool:
+        """Whether every signal is there already, sample for sample."""
+        return all(way == slice(0, self.samples) for way in self.ways.values())
+
+
+def common_time_base(tracks: Mapping[SignalName, Track]) -> TimeBase:
+    """The samples of the highest-rate signal within the overlap of all.
+
+    Raises
+    ------
+    TraceError
+        ``no-overlap``: the signals have fewer than 3 samples in common.
+    """
+    base = max(tracks.values(), key=lambda track: track.rate_hz)
+    start = max(track.start_s for track in tracks.values())
+    stop = min(track.start_s + (track.samples - 1) / track.rate_hz for track in tracks.values())
+    # a thousandth of a step of slack, so that equal records do not lose a sample to rounding
+    first = max(0, ceil((start - base.start_s) * base.rate_hz - 1e-3))
+    last = min(base.samples - 1, floor((stop - base.start_s) * base.rate_hz + 1e-3))
+    if last - first + 1 < QUALITY_LIMITS["record"]["minimum_samples"]:
+        raise TraceError("no-overlap", "The signals must overlap in time by at least 3 samples.")
+    ways = {name: _way(track, base, first, last) for name, track in tracks.items()}
+    return TimeBase(base.rate_hz, base.start_s + first / base.rate_hz, last - first + 1, ways)
+
+
+def _way(track: Track, base: Track, first: int, last: int) -> slice | Onto:
+    alike = abs(track.rate_hz - base.rate_hz) <= 1e-9 * base.rate_hz and track.start_s == base.start_s
+    if alike:
+        return slice(first, last + 1)
+    time_s = base.start_s + np.arange(first, last + 1) / base.rate_hz
+    position = np.clip((time_s - track.start_s) * track.rate_hz, 0.0, track.samples - 1)
+    before = np.minimum(position.astype(np.intp), track.samples - 2)
+    return Onto(before, position - before)
+
+
+def brought(values: FloatArray, way: slice | Onto) -> FloatArray:
+    """Samples of a signal, time first, at those of the base."""
+    if isinstance(way, slice):
+        return values[way]
+    low, high = values[way.before], values[way.before + 1]
+    share = way.share.reshape(-1, *(1,) * (values.ndim - 1))
+    found: FloatArray = (high - low) * share + low
+    return found
