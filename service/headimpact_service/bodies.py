@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 from starlette.requests import Request
+from starlette.types import Message
 
 from headimpact_service.answers import JSON
 from headimpact_service.errors import Problem
@@ -41,41 +42,63 @@ def require_media_type(request: Request, accepted: Iterable[str], named: Iterabl
 
 async def read_body(request: Request, limit: int, slug: str = "body-too-large") -> bytes:
     """The whole body, inflated if it is gzip; 413 as soon as it, sent or inflated, passes `limit` bytes."""
-    parts = [part async for part in body_parts(request, limit, slug)]
+    body = _Body(request, limit, slug)
+    parts: list[bytes] = []
+    try:
+        async with asyncio.timeout_at(body.deadline) as patience:
+            while body.more:
+                parts += body.take(await request.receive())
+                if body.more:
+                    patience.reschedule(body.deadline)
+    except TimeoutError:
+        raise _given_up() from None
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
 async def body_parts(request: Request, limit: int, slug: str) -> AsyncGenerator[bytes, None]:
     """The same as it arrives, in parts of bounded size."""
-    inflate = _inflater(request, limit, slug)
-    declared = request.headers.get("content-length", "")
-    if declared.isdigit() and int(declared) > limit:
-        raise _too_large(limit, slug)
-    received, more = 0, True
-    loop = asyncio.get_running_loop()
-    started, patience = loop.time(), request.app.state.settings.body_timeout_s
-    while more:
-        deadline = started + patience + received / SLOWEST_BYTES_PER_S
-        chunk, more = await _next_chunk(request, deadline)
-        received += len(chunk)
-        if received > limit:
+    body = _Body(request, limit, slug)
+    while body.more:
+        try:
+            async with asyncio.timeout_at(body.deadline):
+                message = await request.receive()
+        except TimeoutError:
+            raise _given_up() from None
+        for part in body.take(message):
+            yield part
+
+
+class _Body:
+    """A body as it arrives, within its bounds of size and time."""
+
+    def __init__(self, request: Request, limit: int, slug: str) -> None:
+        declared = request.headers.get("content-length", "")
+        if declared.isdigit() and int(declared) > limit:
             raise _too_large(limit, slug)
-        if inflate is None:
-            yield chunk
-        else:
-            for part in inflate.feed(chunk, more=more):
-                yield part
+        self.limit, self.slug = limit, slug
+        self.received, self.more = 0, True
+        self._inflate = _inflater(request, limit, slug)
+        self._until = asyncio.get_running_loop().time() + request.app.state.settings.body_timeout_s
+
+    @property
+    def deadline(self) -> float:
+        """When the next bytes must be there, on the loop's clock."""
+        return float(self._until + self.received / SLOWEST_BYTES_PER_S)
+
+    def take(self, message: Message) -> Iterable[bytes]:
+        """What one message of the server brings, inflated."""
+        if message["type"] == "http.disconnect":
+            raise Problem("malformed-request", "The body ended before it was complete.")
+        chunk: bytes = message.get("body", b"")
+        self.more = message.get("more_body", False)
+        self.received += len(chunk)
+        if self.received > self.limit:
+            raise _too_large(self.limit, self.slug)
+        return (chunk,) if self._inflate is None else self._inflate.feed(chunk, more=self.more)
 
 
-async def _next_chunk(request: Request, deadline: float) -> tuple[bytes, bool]:
-    try:
-        async with asyncio.timeout_at(deadline):
-            message = await request.receive()
-    except TimeoutError:
-        raise Problem("request-timeout", "The body did not arrive in time.", headers={"Connection": "close"}) from None
-    if message["type"] == "http.disconnect":
-        raise Problem("malformed-request", "The body ended before it was complete.")
-    return message.get("body", b""), message.get("more_body", False)
+def _given_up() -> Problem:
+    return Problem("request-timeout", "The body did not arrive in time.", headers={"Connection": "close"})
 
 
 def _too_large(limit: int, slug: str) -> Problem:

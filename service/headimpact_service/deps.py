@@ -66,52 +66,52 @@ class Gate:
 
     database: Database
     rate_limit: int | None = None
-    remembered: dict[bytes, tuple[float, Caller]] = field(default_factory=dict)
+    remembered: dict[str, tuple[float, Caller]] = field(default_factory=dict)
+    """By the whole header, as it came: what is sent again and again is found without a digest."""
     counts: dict[bytes, int] = field(default_factory=dict)
     minute: int = 0
 
     async def caller(self, authorization: str | None) -> Caller:
         """The caller of a request with this Authorization header; 401 if there is none."""
-        scheme, _, key = (authorization or "").partition(" ")
-        if scheme.lower() != "bearer" or not key.strip():
-            raise _unauthenticated("The Authorization header must be `Bearer <key>`.")
-        digest = keys.digest(key.strip())
-        until, caller = self.remembered.get(digest, (0.0, None))
+        sent = authorization or ""
+        until, caller = self.remembered.get(sent, (0.0, None))
         if caller is None or time.monotonic() > until:
-            caller = await self._look_up(digest)
-        self._count(caller.key.id)
+            caller = await self._look_up(sent)
+        if self.rate_limit is not None:
+            self._count(caller.key.id, self.rate_limit)
         return caller
 
     def forget(self) -> None:
         """Look every key up again: one was revoked, or an organisation's settings changed."""
         self.remembered.clear()
 
-    async def _look_up(self, digest: bytes) -> Caller:
-        self.remembered.pop(digest, None)
-        found = await run_sync(self._find, digest)
+    async def _look_up(self, authorization: str) -> Caller:
+        self.remembered.pop(authorization, None)
+        scheme, _, key = authorization.partition(" ")
+        if scheme.lower() != "bearer" or not key.strip():
+            raise _unauthenticated("The Authorization header must be `Bearer <key>`.")
+        found = await run_sync(self._find, keys.digest(key.strip()))
         if found is None:
             raise _unauthenticated("The key is unknown, expired or revoked.")
         caller = Caller(found, terms_of(found))
         if len(self.remembered) >= REMEMBERED:
             self.remembered.clear()
-        self.remembered[digest] = (time.monotonic() + REMEMBER_S, caller)
+        self.remembered[authorization] = (time.monotonic() + REMEMBER_S, caller)
         return caller
 
     def _find(self, digest: bytes) -> keys.KeyRow | None:
         with self.database.read() as conn:
             return keys.find_key(conn, digest)
 
-    def _count(self, key_id: bytes) -> None:
-        if self.rate_limit is None:
-            return
+    def _count(self, key_id: bytes, rate_limit: int) -> None:
         now = time.time()
         if int(now // 60) != self.minute:
             self.minute = int(now // 60)
             self.counts.clear()
         self.counts[key_id] = self.counts.get(key_id, 0) + 1
-        if self.counts[key_id] > self.rate_limit:
+        if self.counts[key_id] > rate_limit:
             wait = str(60 - int(now % 60))
-            detail = f"This key may make {self.rate_limit} requests a minute."
+            detail = f"This key may make {rate_limit} requests a minute."
             raise Problem("too-many-requests", detail, headers={"Retry-After": wait})
 
 

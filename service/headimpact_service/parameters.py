@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from datetime import datetime
+from functools import cache
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
@@ -84,7 +85,16 @@ class SyncQuery(ListQuery):
 
 def parse_query(request: Request, model: type[Q]) -> Q:
     """The request's query parameters as `model`; 422 for those that are unknown, repeated or wrong."""
-    return validate_parameters(request.query_params.multi_items() if request.scope["query_string"] else (), model)
+    if not request.scope["query_string"]:
+        defaults: Q = _no_parameters(model)
+        return defaults
+    return validate_parameters(request.query_params.multi_items(), model)
+
+
+@cache
+def _no_parameters(model: type[Q]) -> Q:
+    """What a request without parameters asks: the defaults, or 422 where there are none."""
+    return validate_parameters((), model)
 
 
 def validate_parameters(pairs: Iterable[tuple[str, Any]], model: type[Q]) -> Q:

@@ -1,4 +1,4 @@
-"""What a record's content is, in 64 hexadecimal digits.
+"""What a record's content is, in 32 bytes.
 
 Two deliveries of one impact have one content digest however they were written: key order, ``1`` or ``1.0``, ``Z`` or
 ``+00:00``, JSON or CSV make no difference; one changed sample does. The digest is SHA-256 over canonical bytes: the
@@ -8,15 +8,16 @@ stamps as little-endian float64 in row order (-0.0 counts as 0.0), every part pr
 
 from __future__ import annotations
 
-import hashlib
 import json
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
 
-from headimpact.recording import Mounting, Recording, Signal
+from headimpact.recording import Recording, Signal
+from headimpact.uniform import MountingNumbers
 from headimpact_service.ingest.record import ImpactRecord
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -27,30 +28,7 @@ VERSION = 1
 """Part of every digest: a change of the canonical bytes changes it, so that old and new digests never meet."""
 
 
-@dataclass(frozen=True, slots=True)
-class Digests:
-    """Both digests of one record, each ``sha256:`` and 64 hexadecimal digits."""
-
-    input: str
-    content: str
-
-
-def digests(record: ImpactRecord, *, athlete: str | None = None) -> Digests:
-    """Both digests, reading the samples once; `athlete` as for :func:`content_digest`."""
-    kinematics = input_digest(record)
-    members = {
-        "athlete": athlete or record.athlete_id or record.athlete_external_id,
-        "athlete_by": "id" if athlete or record.athlete_id else "external_id",
-        "context": dict(record.context),
-        "device": record.device_serial,
-        "kinematics": kinematics,
-        "occurred_at": None if record.occurred_at is None else (record.occurred_at - _EPOCH) // _MICROSECOND,
-        "unscorable": list(record.unscorable),
-    }
-    return Digests(input=kinematics, content=_named(hashlib.sha256(_canonical(members)).hexdigest()))
-
-
-def content_digest(record: ImpactRecord, *, athlete: str | None = None) -> str:
+def content_digest(record: ImpactRecord, kinematics: bytes | None = None) -> bytes:
     """The digest of everything that makes the impact the one it is.
 
     That is its kinematics, athlete, instant, device, context and the reasons not to score it; not its `external_id`,
@@ -60,53 +38,91 @@ def content_digest(record: ImpactRecord, *, athlete: str | None = None) -> str:
     ----------
     record
         The impact.
-    athlete
-        The stored athlete's id, where it has been looked up: then an athlete named by either id counts as the same.
+    kinematics
+        Its :func:`input_digest`, where that is known.
     """
-    return digests(record, athlete=athlete).content
-
-
-def input_digest(record: ImpactRecord) -> str:
-    """The digest of the kinematics alone: what a score is computed from."""
-    digest = hashlib.sha256(_canonical(_members(record.recording, record.needs_device_mounting)))
-    for name, signal in record.recording.signals():
-        digest.update(_canonical({"signal": name, "unit": signal.unit, "rate": signal.sample_rate_hz}))
-        digest.update(_samples(signal))
-    return _named(digest.hexdigest())
-
-
-def _named(hexadecimal: str) -> str:
-    return f"sha256:{hexadecimal}"
-
-
-def _members(recording: Recording, needs_device_mounting: bool) -> dict[str, Any]:
-    low_pass = recording.low_pass
-    filled = {"fill_gaps": True} if recording.fill_gaps else {}
-    return filled | {
-        "version": VERSION,
-        "axes": recording.axes,
-        "location": "device" if needs_device_mounting else None,
-        "mounting": None if recording.mounting is None else _mounting(recording.mounting),
-        "constrained_plane": recording.constrained_plane,
-        "pre_trigger_ms": None if recording.pre_trigger_ms is None else float(recording.pre_trigger_ms),
-        "filter": [_number(low_pass.linear_acceleration), _number(low_pass.angular_velocity)],
+    members = {
+        "athlete": record.athlete_id or record.athlete_external_id,
+        "athlete_by": "id" if record.athlete_id else "external_id",
+        "context": dict(record.context),
+        "device": record.device_serial,
+        "kinematics": shown(kinematics or input_digest(record)),
+        "occurred_at": None if record.occurred_at is None else (record.occurred_at - _EPOCH) // _MICROSECOND,
+        "unscorable": list(record.unscorable),
     }
+    return sha256(_canonical(members)).digest()
 
 
-def _mounting(mounting: Mounting) -> list[Any]:
-    parts = (mounting.accelerometer_rotation, mounting.gyroscope_rotation, mounting.offset_m)
+def input_digest(record: ImpactRecord) -> bytes:
+    """The digest of the kinematics alone: what a score is computed from."""
+    parts = [_reading(record.recording, record.needs_device_mounting)]
+    for name, signal in record.recording.signals():
+        parts.append(_heading(name, signal.unit, signal.sample_rate_hz))
+        parts += _samples(signal)
+    return sha256(b"".join(parts)).digest()
+
+
+def shown(digest: bytes) -> str:
+    """A digest as it is written."""
+    return f"sha256:{digest.hex()}"
+
+
+def _reading(recording: Recording, needs_device_mounting: bool) -> bytes:
+    mounting = None if recording.mounting is None else MountingNumbers.of(recording.mounting)
+    # Numbers that are equal are kept as one, so they must be one kind of number.
+    pre_trigger_ms = None if recording.pre_trigger_ms is None else float(recording.pre_trigger_ms)
+    low_pass = recording.low_pass
+    chosen = (_number(low_pass.linear_acceleration), _number(low_pass.angular_velocity))
+    plane = recording.constrained_plane
+    return _canonical_reading(
+        recording.axes, mounting, plane, pre_trigger_ms, chosen, recording.fill_gaps, needs_device_mounting
+    )
+
+
+@lru_cache(maxsize=512)
+def _canonical_reading(
+    axes: str,
+    mounting: MountingNumbers | None,
+    constrained_plane: str | None,
+    pre_trigger_ms: float | None,
+    low_pass: tuple[float | str | None, float | str | None],
+    fill_gaps: bool,
+    needs_device_mounting: bool,
+) -> bytes:
+    """How the samples are to be read. Devices say it the same way again and again, so it is kept."""
+    members = {
+        "version": VERSION,
+        "axes": axes,
+        "location": "device" if needs_device_mounting else None,
+        "mounting": None if mounting is None else _mounting(mounting),
+        "constrained_plane": constrained_plane,
+        "pre_trigger_ms": pre_trigger_ms,
+        "filter": list(low_pass),
+    }
+    return _canonical(members | ({"fill_gaps": True} if fill_gaps else {}))
+
+
+def _mounting(mounting: MountingNumbers) -> list[Any]:
+    parts = (mounting.accelerometer_rotation, mounting.gyroscope_rotation)
+    rotations = [(np.array(part).reshape(3, 3) + 0.0).tolist() for part in parts]
+    offset = (np.array(mounting.offset_m) + 0.0).tolist()
     delays = [mounting.accelerometer_delay_s, mounting.gyroscope_delay_s]
-    return [(np.asarray(part, dtype=np.float64) + 0.0).tolist() for part in parts] + (delays if any(delays) else [])
+    return [*rotations, offset, *(delays if any(delays) else ())]
 
 
 def _number(cut_off: float | str | None) -> float | str | None:
     return float(cut_off) if isinstance(cut_off, int | float) else cut_off
 
 
-def _samples(signal: Signal) -> bytes:
+@lru_cache(maxsize=512)
+def _heading(signal: str, unit: str, sample_rate_hz: float | None) -> bytes:
+    return _canonical({"signal": signal, "unit": unit, "rate": sample_rate_hz})
+
+
+def _samples(signal: Signal) -> tuple[bytes, ...]:
     values = _float64(signal.values)
     stamps = b"" if signal.time_s is None else _float64(signal.time_s)
-    return b"%d:%b%d:%b" % (len(values), values, len(stamps), stamps)
+    return b"%d:" % len(values), values, b"%d:" % len(stamps), stamps
 
 
 def _float64(values: np.ndarray[Any, np.dtype[np.float64]]) -> bytes:

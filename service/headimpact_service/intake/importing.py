@@ -18,7 +18,7 @@ from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.intake.facts import facts_in
 from headimpact_service.intake.records import describe, kinematics_document
 from headimpact_service.intake.rendering import new_score, score_document
-from headimpact_service.intake.scoring import DeviceFacts, Scored, Terms, digest_bytes, score_records
+from headimpact_service.intake.scoring import DeviceFacts, Scored, Terms, score_records
 from headimpact_service.intake.storing import new_impact
 from headimpact_service.store import ids, impacts
 from headimpact_service.store.impacts import NewImpact
@@ -63,7 +63,8 @@ def _item(record: ImpactRecord | Problem, scored: Scored | Problem | None) -> It
     if isinstance(record, Problem):
         return Item(record.external_id if isinstance(record, RefusedImpact) else None, record)
     assert scored is not None
-    return Item(record.external_id, scored, digest_bytes(content_digest(record)))
+    sent_digest = scored.sent_digest if isinstance(scored, Scored) else None
+    return Item(record.external_id, scored, content_digest(record, sent_digest))
 
 
 def make_ready(items: Iterable[Item], key_id: bytes | None) -> list[Ready]:

@@ -14,6 +14,7 @@ from headimpact.recording import AXES
 from headimpact.risk import OperatingPoint, resolve_operating_point
 from headimpact.scoring import CriterionScore, ImpactScore
 from headimpact_service import __version__
+from headimpact_service.ingest.digest import shown
 from headimpact_service.intake.records import axes_lists
 from headimpact_service.intake.scoring import Scored
 from headimpact_service.store.score_rows import NewScore
@@ -167,7 +168,7 @@ def score_document(score: NewScore) -> dict[str, Any]:
         document["extra_criteria"] = details["extra_criteria"]
     document["operating_points"] = details["operating_points"]
     document["provenance"] = {
-        "input_digest": "sha256:" + score.input_digest.hex(),
+        "input_digest": shown(score.input_digest),
         "service_version": score.service_version,
         "model": score.model,
         "incidence": score.incidence,

@@ -54,8 +54,10 @@ class Scored:
     preparation: Preparation | None
     points: tuple[OperatingPoint, ...]
     reasons: tuple[str, ...]
+    sent_digest: bytes
+    """SHA-256 of the kinematics as they were sent."""
     input_digest: bytes
-    """SHA-256 of what the score depends on."""
+    """SHA-256 of what the score depends on: the same, with the mounting of the device where that was needed."""
 
 
 UNKNOWN_DEVICE = DeviceFacts()
@@ -119,10 +121,13 @@ def _asked(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored:
     """What is asked of a record, with what its device adds; not prepared yet, and never if there are reasons."""
     points = operating_points(record.operating_points, terms)
     _require_known(record.extra_criteria)
+    sent_digest = input_digest(record)
+    needed_device = record.needs_device_mounting
     record = with_device(record, device)
     if record.context.get("worn") is False:
         record = replace(record, notes=(*record.notes, NOT_WORN))
-    return Scored(record, terms, None, None, points, record.unscorable, digest_bytes(input_digest(record)))
+    digest = input_digest(record) if needed_device else sent_digest
+    return Scored(record, terms, None, None, points, record.unscorable, sent_digest, digest)
 
 
 def _require_known(extra_criteria: Sequence[str]) -> None:
@@ -131,11 +136,6 @@ def _require_known(extra_criteria: Sequence[str]) -> None:
             detail = f"Extra criteria are {', '.join(EXTRA_CRITERIA)}."
             error = PayloadError(detail=detail, code="not-allowed", pointer=f"/extra_criteria/{index}")
             raise Problem("invalid-payload", detail, errors=[error])
-
-
-def digest_bytes(text: str) -> bytes:
-    """The 32 bytes of a digest that is written `sha256:…`."""
-    return bytes.fromhex(text.removeprefix("sha256:"))
 
 
 def with_device(record: ImpactRecord, device: DeviceFacts) -> ImpactRecord:

@@ -17,7 +17,7 @@ from headimpact_service.ingest.impact_reading import to_record
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.exporting import CONTEXT_FLAGS
 from headimpact_service.intake.rendering import as_asked, scored_traces
-from headimpact_service.intake.scoring import Scored, digest_bytes
+from headimpact_service.intake.scoring import Scored
 from headimpact_service.intake.storing import new_impact
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import Instant, Probability, SyncQuery
@@ -68,9 +68,8 @@ async def create_impact(call: Call) -> Response:
 
 async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
     """The record's score, and the rows of both."""
-    sent = digest_bytes(content_digest(record))
     scored = await score(call, record)
-    return scored, new_impact(scored, sent, call.key.id)
+    return scored, new_impact(scored, content_digest(record, scored.sent_digest), call.key.id)
 
 
 def _answer(impact: Impact, status: int, scored: Scored | None, *, redelivered: bool = False) -> Response:
