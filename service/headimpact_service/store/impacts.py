@@ -181,7 +181,7 @@ def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known)
     }
     digest = external_id_digest(data_set_id, new.external_id)
     row = members | {"data_set_id": data_set_id, "external_id_digest": digest, "score_number": 1}
-    _INSERT_IMPACT.execute(conn, row)
+    _INSERT_IMPACT.run(conn, row)
     _insert_revision(conn, new, row, now)
     return Impact(
         **members,
@@ -229,8 +229,8 @@ def _insert_revision(conn: Connection, new: NewImpact, row: dict[str, Any], now:
         "superseded_at": None,
         "trace": new.trace,
     }
-    _INSERT_REVISION.execute(conn, kept)
-    _INSERT_SCORE.execute(conn, row_of(new.score, impact_id, row["score_number"], revision, now))
+    _INSERT_REVISION.run(conn, kept)
+    _INSERT_SCORE.run(conn, row_of(new.score, impact_id, row["score_number"], revision, now))
 
 
 def correct(
