@@ -33,7 +33,7 @@ class _Plan(NamedTuple):
 
 
 class Prepared:
-    """A statement with named parameters, compiled once for each dialect. It runs inside the connection's transaction."""
+    """A statement with named parameters, compiled once for each dialect; it runs in the connection's transaction."""
 
     def __init__(self, statement: Select[Any] | Insert, columns: Iterable[str] | None = None) -> None:
         """`columns` are those that an insert fills."""
