@@ -1,8 +1,9 @@
 """The samples of an impact as bytes: lossless, small, and readable by every later version.
 
-The first byte names the codec. Codec 1: a table of names, types and shapes, then one zlib stream of all arrays. An
-array is stored as float32 when that is exact for every sample, else as float64, component by component (n x 3 as
-3 x n), its bytes transposed so that bytes of equal weight stand together and compress.
+The first byte names the codec. Codec 1: a table of names, forms and shapes, then one zlib stream of all arrays. Each
+array is stored in the first of three forms that gives every bit of it back: float32; whole multiples of 10^-d, as JSON
+and CSV write samples, as int32 differences from sample to sample; float64. Component by component (n x 3 as 3 x n), its
+bytes transposed so that bytes of equal weight stand together and compress.
 """
 
 from __future__ import annotations
@@ -11,48 +12,93 @@ import math
 import struct
 import zlib
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+FloatArray = NDArray[np.float64]
+
 CODEC = 1
 _LEVEL = 1  # of zlib: level 6 costs three times as much time for 2 % of the size
-_ENTRY = struct.Struct("<BBBII")  # length of the name, item size, dimensions, rows, columns
+_ENTRY = struct.Struct("<BBBII")  # length of the name, form, dimensions, rows, columns
 _MAX_NAME = 255
+
+SINGLE, DOUBLE = 4, 8
+"""Forms of floats, named by their bytes."""
+DECIMAL = 16
+"""The form of multiples of 10^-d is this plus d."""
+DIGITS = (2, 4, 6)
+_GLANCE = 8
+_LARGEST = 2.0**31 - 1
 
 
 class TraceCodecError(ValueError):
     """The bytes are not a stored trace that this version reads."""
 
 
-def encode(signals: Mapping[str, NDArray[np.float64]]) -> bytes:
+class _Stored(NamedTuple):
+    """An array in its form: `plane` is one-dimensional, component by component."""
+
+    form: int
+    shape: tuple[int, ...]
+    plane: NDArray[np.float32] | NDArray[np.float64] | NDArray[np.int32]
+
+
+def encode(signals: Mapping[str, FloatArray]) -> bytes:
     """Arrays of float64 with one or two dimensions, by name, as bytes."""
     header = bytearray((CODEC, len(signals)))
     planes = []
-    for name, values in signals.items():
-        stored = _narrow(np.asarray(values, dtype=np.float64))
-        header += _entry(name, stored)
-        planes.append(stored.T.reshape(-1).view(np.uint8).reshape(-1, stored.itemsize).T.tobytes())
+    with np.errstate(over="ignore", invalid="ignore"):  # a form that cannot hold a value is not the one chosen
+        for name, values in signals.items():
+            stored = _stored(np.asarray(values, dtype=np.float64))
+            header += _entry(name, stored)
+            planes.append(stored.plane.view(np.uint8).reshape(-1, stored.plane.itemsize).T.tobytes())
     return bytes(header) + zlib.compress(b"".join(planes), _LEVEL)
 
 
-def _narrow(values: NDArray[np.float64]) -> NDArray[np.float32] | NDArray[np.float64]:
-    """The values as float32 if every bit comes back, else as they are."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        single = values.astype(np.float32)
-    same = np.array_equal(single.astype(np.float64).view(np.uint64), values.view(np.uint64))
-    return single if same else values
+def _stored(values: FloatArray) -> _Stored:
+    """The values in the smallest form from which every bit comes back."""
+    rows = np.ascontiguousarray(values.T)
+    single = rows.astype(np.float32)
+    if _same_bits(single.astype(np.float64), rows):
+        return _Stored(SINGLE, values.shape, single.reshape(-1))
+    digits = _digits(rows)
+    if digits is not None:
+        multiples = np.rint(rows * 10.0**digits)
+        multiples += 0.0  # whole numbers know no -0.0
+        if _same_bits(multiples / 10.0**digits, rows) and np.abs(multiples).max(initial=0.0) <= _LARGEST:
+            return _Stored(DECIMAL + digits, values.shape, _differences(multiples.astype(np.int32)))
+    return _Stored(DOUBLE, values.shape, rows.reshape(-1))
 
 
-def _entry(name: str, stored: NDArray[np.float32] | NDArray[np.float64]) -> bytes:
+def _digits(rows: FloatArray) -> int | None:
+    """How many decimals the samples may have, by a glance at the first few."""
+    few = rows.reshape(-1)[:_GLANCE].tolist()
+    return next((digits for digits in DIGITS if all(round(value, digits) == value for value in few)), None)
+
+
+def _same_bits(found: FloatArray, values: FloatArray) -> bool:
+    return bool((found.view(np.uint64) == values.view(np.uint64)).all())
+
+
+def _differences(whole: NDArray[np.int32]) -> NDArray[np.int32]:
+    """From sample to sample, the first as it is. Beyond the range of int32 they wrap, there and back."""
+    flat = whole.reshape(-1)
+    steps = flat.copy()
+    steps[1:] -= flat[:-1]
+    return steps
+
+
+def _entry(name: str, stored: _Stored) -> bytes:
     label = name.encode()
-    if len(label) > _MAX_NAME or stored.ndim not in {1, 2}:
+    if len(label) > _MAX_NAME or len(stored.shape) not in {1, 2}:
         raise TraceCodecError("A signal has a name of up to 255 bytes and one or two dimensions.")
-    rows, columns = stored.shape if stored.ndim == 2 else (stored.shape[0], 1)
-    return _ENTRY.pack(len(label), stored.itemsize, stored.ndim, rows, columns) + label
+    rows, columns = stored.shape if len(stored.shape) == 2 else (stored.shape[0], 1)
+    return _ENTRY.pack(len(label), stored.form, len(stored.shape), rows, columns) + label
 
 
-def decode(data: bytes) -> dict[str, NDArray[np.float64]]:
+def decode(data: bytes) -> dict[str, FloatArray]:
     """The arrays of :func:`encode`, bit for bit."""
     try:
         return _decode(data)
@@ -60,7 +106,7 @@ def decode(data: bytes) -> dict[str, NDArray[np.float64]]:
         raise TraceCodecError("The stored trace is damaged.") from error
 
 
-def _decode(data: bytes) -> dict[str, NDArray[np.float64]]:
+def _decode(data: bytes) -> dict[str, FloatArray]:
     if data[0] != CODEC:
         raise TraceCodecError("The stored trace was written by a codec that this version does not know.")
     entries = []
@@ -73,25 +119,28 @@ def _decode(data: bytes) -> dict[str, NDArray[np.float64]]:
     return _arrays(entries, zlib.decompress(memoryview(data)[offset:]))
 
 
-def _arrays(entries: list[tuple[str, int, int, int, int]], payload: bytes) -> dict[str, NDArray[np.float64]]:
+def _arrays(entries: list[tuple[str, int, int, int, int]], payload: bytes) -> dict[str, FloatArray]:
     arrays = {}
     offset = 0
-    for name, size, dimensions, rows, columns in entries:
-        if size not in {4, 8} or dimensions not in {1, 2}:
+    for name, form, dimensions, rows, columns in entries:
+        if form not in {SINGLE, DOUBLE, *(DECIMAL + digits for digits in DIGITS)} or dimensions not in {1, 2}:
             raise TraceCodecError("The stored trace is damaged.")
         shape = (rows,) if dimensions == 1 else (columns, rows)
-        end = offset + size * math.prod(shape)
-        arrays[name] = _widen(payload[offset:end], size, shape)
+        end = offset + (DOUBLE if form == DOUBLE else SINGLE) * math.prod(shape)
+        arrays[name] = _widened(payload[offset:end], form, shape)
         offset = end
     if offset != len(payload):
         raise TraceCodecError("The stored trace is damaged.")
     return arrays
 
 
-def _widen(plane: bytes, size: int, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _widened(plane: bytes, form: int, shape: tuple[int, ...]) -> FloatArray:
     """One array from its transposed bytes."""
+    kind = {SINGLE: "<f4", DOUBLE: "<f8"}.get(form, "<i4")
+    size = int(kind[2])
     if len(plane) != size * math.prod(shape):
         raise TraceCodecError("The stored trace is damaged.")
-    shuffled = np.frombuffer(plane, dtype=np.uint8).reshape(size, -1).T
-    stored = np.ascontiguousarray(shuffled).reshape(-1).view(f"<f{size}").reshape(shape)
-    return np.ascontiguousarray(stored.T, dtype=np.float64)
+    stored = np.ascontiguousarray(np.frombuffer(plane, dtype=np.uint8).reshape(size, -1).T).reshape(-1).view(kind)
+    if form > DECIMAL:
+        stored = np.add.accumulate(stored, dtype=np.int32) / 10.0 ** (form - DECIMAL)
+    return np.ascontiguousarray(stored.reshape(shape).T, dtype=np.float64)

@@ -19,10 +19,18 @@ any_bits = arrays(np.uint64, array_shapes(min_dims=1, max_dims=2, min_side=0, ma
 single = arrays(np.float32, array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=40)).map(
     lambda values: values.astype(np.float64)
 )
+decimal = st.tuples(
+    arrays(
+        np.int64,
+        array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=40),
+        elements=st.integers(-(2**33), 2**33) | st.integers(-2000, 2000),
+    ),
+    st.integers(0, 7),
+).map(lambda drawn: drawn[0] / 10.0 ** drawn[1])
 WAVE = np.sin(np.linspace(0, 6, 300)).reshape(100, 3)
 
 
-@given(st.dictionaries(st.text(max_size=20), any_bits | single, max_size=5))
+@given(st.dictionaries(st.text(max_size=20), any_bits | single | decimal, max_size=5))
 def test_every_bit_of_every_array_comes_back(signals: dict[str, np.ndarray]) -> None:
     decoded = traces.decode(traces.encode(signals))
     assert list(decoded) == list(signals)
@@ -41,10 +49,29 @@ def test_samples_of_single_precision_take_less_than_half_the_bytes() -> None:
     assert len(traces.encode({"a": narrow})) < 0.55 * len(traces.encode({"a": WAVE}))
 
 
+@pytest.mark.parametrize("digits", [1, 2, 3, 4, 5, 6])
+def test_samples_written_with_few_decimals_take_less_than_half_the_bytes(digits: int) -> None:
+    assert len(traces.encode({"a": np.round(40 * WAVE, digits)})) < 0.5 * len(traces.encode({"a": 40 * WAVE}))
+
+
+@pytest.mark.parametrize("value", [-0.0, np.nan, np.inf, 1e-5, 2147.5, -21474.83648, 2.0**31 / 100])
+@pytest.mark.parametrize("at", [0, 90])
+def test_a_sample_that_is_no_decimal_of_the_others_kind_is_kept_as_it_is(value: float, at: int) -> None:
+    changed = np.round(40 * WAVE, 4)
+    changed[at, 1] = value
+    assert traces.decode(traces.encode({"a": changed}))["a"].tobytes() == changed.tobytes()
+
+
 def test_what_was_written_today_is_read_for_ever() -> None:
     fixed = bytes([1, 1]) + bytes.fromhex("01 04 01 03000000 01000000") + b"a"
     fixed += zlib.compress(np.array([1.0, -0.0, 2.5], dtype="<f4").view(np.uint8).reshape(3, 4).T.tobytes())
     assert traces.decode(fixed)["a"].tobytes() == np.array([1.0, -0.0, 2.5]).tobytes()
+
+
+def test_multiples_that_were_written_today_are_read_for_ever() -> None:
+    fixed = bytes([1, 1]) + bytes.fromhex("01 12 01 03000000 01000000") + b"a"
+    fixed += zlib.compress(np.array([150, -275, 1], dtype="<i4").view(np.uint8).reshape(3, 4).T.tobytes())
+    assert traces.decode(fixed)["a"].tolist() == [1.5, -1.25, -1.24]
 
 
 def test_a_signal_of_three_dimensions_is_refused() -> None:
