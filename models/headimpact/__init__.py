@@ -18,14 +18,18 @@ if TYPE_CHECKING:
     from headimpact.criteria import CRITERIA, CRITERION_KEYS, Criterion
     from headimpact.criteria.extra import EXTRA_CRITERIA, ExtraCriterion
     from headimpact.errors import (
+        CalibrationError,
         HeadimpactError,
+        ModelDocumentError,
         OperatingPointUnreachable,
+        SeparationError,
         TraceError,
         UnknownCriterion,
         UnknownModel,
     )
     from headimpact.filtering import NO_FILTER, PAPER, AppliedFilter, LowPass
     from headimpact.kinematics import HeadKinematics, Motion
+    from headimpact.model_document import model_from_document, model_from_text, model_to_document
     from headimpact.preparation import Preparation, prepare, prepare_many
     from headimpact.quality import QualityNote
     from headimpact.recording import AXES, STANDARD_GRAVITY, Mounting, Recording, Signal
@@ -34,15 +38,16 @@ if TYPE_CHECKING:
         LAKSARI_2020,
         PUBLISHED_MODELS,
         CriticalValue,
+        KnownPoint,
         OperatingPoint,
         OperatingPointRequest,
-        PublishedPoint,
         RiskCurve,
         RiskModel,
         critical_values,
         load_model,
         resolve_operating_point,
     )
+    from headimpact.risk_map import RiskMap, draw_risk_map
     from headimpact.scoring import CONVENTIONS, BrainAngle, CriterionScore, ImpactScore, Peaks, score, score_many
 
 __all__ = [
@@ -59,6 +64,7 @@ __all__ = [
     "STANDARD_GRAVITY",
     "AppliedFilter",
     "BrainAngle",
+    "CalibrationError",
     "Criterion",
     "CriterionScore",
     "CriticalValue",
@@ -66,7 +72,9 @@ __all__ = [
     "HeadKinematics",
     "HeadimpactError",
     "ImpactScore",
+    "KnownPoint",
     "LowPass",
+    "ModelDocumentError",
     "Motion",
     "Mounting",
     "OperatingPoint",
@@ -74,18 +82,23 @@ __all__ = [
     "OperatingPointUnreachable",
     "Peaks",
     "Preparation",
-    "PublishedPoint",
     "QualityNote",
     "Recording",
     "RiskCurve",
+    "RiskMap",
     "RiskModel",
+    "SeparationError",
     "Signal",
     "TraceError",
     "UnknownCriterion",
     "UnknownModel",
     "brain_angle_history",
     "critical_values",
+    "draw_risk_map",
     "load_model",
+    "model_from_document",
+    "model_from_text",
+    "model_to_document",
     "peak_brain_angles",
     "prepare",
     "prepare_many",
@@ -98,9 +111,19 @@ _MODULES = {
     "brain": ("brain_angle_history", "peak_brain_angles"),
     "criteria": ("CRITERIA", "CRITERION_KEYS", "Criterion"),
     "criteria.extra": ("EXTRA_CRITERIA", "ExtraCriterion"),
-    "errors": ("HeadimpactError", "OperatingPointUnreachable", "TraceError", "UnknownCriterion", "UnknownModel"),
+    "errors": (
+        "CalibrationError",
+        "HeadimpactError",
+        "ModelDocumentError",
+        "OperatingPointUnreachable",
+        "SeparationError",
+        "TraceError",
+        "UnknownCriterion",
+        "UnknownModel",
+    ),
     "filtering": ("NO_FILTER", "PAPER", "AppliedFilter", "LowPass"),
     "kinematics": ("HeadKinematics", "Motion"),
+    "model_document": ("model_from_document", "model_from_text", "model_to_document"),
     "preparation": ("Preparation", "prepare", "prepare_many"),
     "quality": ("QualityNote",),
     "recording": ("AXES", "STANDARD_GRAVITY", "Mounting", "Recording", "Signal"),
@@ -111,13 +134,14 @@ _MODULES = {
         "CriticalValue",
         "OperatingPoint",
         "OperatingPointRequest",
-        "PublishedPoint",
+        "KnownPoint",
         "RiskCurve",
         "RiskModel",
         "critical_values",
         "load_model",
         "resolve_operating_point",
     ),
+    "risk_map": ("RiskMap", "draw_risk_map"),
     "scoring": ("CONVENTIONS", "BrainAngle", "CriterionScore", "ImpactScore", "Peaks", "score", "score_many"),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}

@@ -56,3 +56,54 @@ class UnknownCriterion(HeadimpactError, KeyError):  # noqa: N818 - named for wha
 
     def __str__(self) -> str:
         return str(self.args[0])
+
+
+class CalibrationError(HeadimpactError, ValueError):
+    """A sample that no risk curve can be fitted to, or options that do not fit it.
+
+    Parameters
+    ----------
+    code
+        What is wrong, as a slug (``"no-events"``).
+    message
+        A sentence for people: what is missing, and how much of it would do.
+    """
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class SeparationError(CalibrationError):
+    """Predictors that tell every event from every other impact: the likelihood has no maximum.
+
+    Parameters
+    ----------
+    kind
+        ``"complete"``, or ``"quasi-complete"`` where only impacts on the boundary are of both kinds.
+    """
+
+    def __init__(self, kind: str) -> None:
+        super().__init__(
+            "separation",
+            f"The outcome is separated ({kind}): some plane has every concussion on one side, so that maximum "
+            "likelihood gives infinite slopes. More impacts of both kinds are needed, or Firth's correction.",
+        )
+        self.kind = kind
+
+
+class ModelDocumentError(HeadimpactError, ValueError):
+    """A document that is no risk model.
+
+    Parameters
+    ----------
+    pointer
+        Where in the document, as a JSON pointer.
+    message
+        The rule that is broken.
+    """
+
+    def __init__(self, pointer: str, message: str) -> None:
+        super().__init__(f"{pointer or '/'}: {message}")
+        self.pointer = pointer
+        self.detail = message

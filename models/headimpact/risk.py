@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from math import exp, log
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,20 +38,26 @@ class RiskCurve:
         One coefficient per component of the criterion, per its unit.
     significant
         Whether the source marks each coefficient as significant at p < 0.05.
+    covariance
+        Of intercept and coefficients, k x k, where the curve was fitted to a cohort; sources publish none.
     """
 
     b0: float
     b: tuple[float, ...]
     significant: tuple[bool, ...] = ()
+    covariance: tuple[tuple[float, ...], ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedPoint:
-    """An operating point that a source gives, by its linear predictor at the model's own incidence."""
+class KnownPoint:
+    """An operating point that a source gives or a cohort shows, by its linear predictor at the model's own incidence.
+
+    Of an interval's ends, one that a cohort is too small to bound is None.
+    """
 
     sensitivity: float
     linear_predictor: float
-    linear_predictor_interval: tuple[float, float]
+    linear_predictor_interval: tuple[float | None, float | None]
     specificity: float | None = None
     axis_intercepts: tuple[float, ...] = ()
     printed: str = ""
@@ -67,7 +73,10 @@ class RiskModel:
     population: str
     incidence: float
     curves: Mapping[str, RiskCurve]
-    operating_points: Mapping[str, tuple[PublishedPoint, ...]] = field(default_factory=dict)
+    operating_points: Mapping[str, tuple[KnownPoint, ...]] = field(default_factory=dict)
+    basis: Literal["published", "cohort"] = "published"
+    cohort: Mapping[str, Any] = field(default_factory=dict)
+    """What a fitted model was fitted on: impacts, events, athletes, digest, sampling, bias correction."""
 
     @cached_property
     def coefficients(self) -> tuple[FloatArray, FloatArray]:
@@ -80,6 +89,20 @@ class RiskModel:
                 b0[row] = curve.b0
                 b[row, : len(curve.b)] = curve.b
         return b0, b
+
+    @cached_property
+    def covariances(self) -> FloatArray | None:
+        """Of intercepts and coefficients, 13 x 4 x 4 in CRITERIA's order, NaN without one; None if no curve has one."""
+        if all(curve.covariance is None for curve in self.curves.values()):
+            return None
+        found = np.full((len(CRITERION_KEYS), 4, 4), np.nan)
+        for row, key in enumerate(CRITERION_KEYS):
+            curve = self.curves.get(key)
+            if curve is not None and curve.covariance is not None:
+                found[row] = 0.0
+                k = len(curve.covariance)
+                found[row, :k, :k] = curve.covariance
+        return found
 
     def incidence_shift(self, incidence: float | None) -> float:
         """What is added to every linear predictor to serve another incidence (King & Zeng 2001, prior correction)."""
@@ -130,9 +153,9 @@ def _read_model(name: str) -> RiskModel:
     )
 
 
-def _read_point(data: dict[str, Any]) -> PublishedPoint:
+def _read_point(data: dict[str, Any]) -> KnownPoint:
     low, high = data["linear_predictor_interval"]
-    return PublishedPoint(
+    return KnownPoint(
         sensitivity=data["sensitivity"],
         linear_predictor=data["linear_predictor"],
         linear_predictor_interval=(low, high),
@@ -177,12 +200,13 @@ class OperatingPoint:
     """A threshold on a criterion's probability, and how sure it is.
 
     `basis` is ``published``, ``interpolated`` (linear in the linear predictor between published sensitivities),
-    ``cohort`` or ``requested``. `threshold_interval` is what the source's rounding leaves open.
+    ``cohort`` or ``requested``. `threshold_interval` is what the source's rounding leaves open, or what a cohort of its
+    size leaves open at 95 %; an end is None where the cohort has too few events to bound it.
     """
 
     request: OperatingPointRequest
     threshold: float
-    threshold_interval: tuple[float, float] | None
+    threshold_interval: tuple[float | None, float | None] | None
     sensitivity: float | None
     specificity: float | None
     basis: str
@@ -216,25 +240,38 @@ def resolve_operating_point(
             f"Model {model.version} has no operating points for {request.criterion}; ask for a threshold instead."
         )
     shift = model.incidence_shift(incidence)
+    if model.basis == "cohort":
+        return _of_cohort(request, points, shift)
     if request.specificity is not None:
         return _by_specificity(request, points, shift)
     return _by_sensitivity(request, points, shift)
 
 
-def _by_specificity(request: OperatingPointRequest, points: tuple[PublishedPoint, ...], shift: float) -> OperatingPoint:
+def _of_cohort(request: OperatingPointRequest, points: tuple[KnownPoint, ...], shift: float) -> OperatingPoint:
+    """The largest threshold of a sensitivity that is reached, or the smallest of a specificity that is."""
+    ordered = sorted(points, key=lambda point: point.sensitivity)
+    for point in ordered if request.sensitivity is not None else reversed(ordered):
+        if request.sensitivity is not None and point.sensitivity >= request.sensitivity - 1e-9:
+            return _at(request, point, shift, "cohort")
+        if request.specificity is not None and (point.specificity or 0.0) >= request.specificity - 1e-9:
+            return _at(request, point, shift, "cohort")
+    raise OperatingPointUnreachable(f"No threshold on {request.criterion} reaches that in the model's cohort.")
+
+
+def _by_specificity(request: OperatingPointRequest, points: tuple[KnownPoint, ...], shift: float) -> OperatingPoint:
     assert request.specificity is not None
     for point in points:
         if point.specificity is not None and _printed_alike(point.specificity, request.specificity):
-            return _published(request, point, shift)
+            return _at(request, point, shift, "published")
     known = ", ".join(f"{p.specificity:.3f}" for p in points if p.specificity is not None)
     raise OperatingPointUnreachable(f"The only specificities published for {request.criterion} are: {known}.")
 
 
-def _by_sensitivity(request: OperatingPointRequest, points: tuple[PublishedPoint, ...], shift: float) -> OperatingPoint:
+def _by_sensitivity(request: OperatingPointRequest, points: tuple[KnownPoint, ...], shift: float) -> OperatingPoint:
     assert request.sensitivity is not None
     for point in points:
         if _printed_alike(point.sensitivity, request.sensitivity):
-            return _published(request, point, shift)
+            return _at(request, point, shift, "published")
     ordered = sorted(points, key=lambda point: point.sensitivity)
     for below, above in pairwise(ordered):
         if below.sensitivity < request.sensitivity < above.sensitivity:
@@ -249,32 +286,34 @@ def _printed_alike(published: float, asked: float) -> bool:
     return round(published, PRINTED_DIGITS) == round(asked, PRINTED_DIGITS)
 
 
-def _published(request: OperatingPointRequest, point: PublishedPoint, shift: float) -> OperatingPoint:
-    low, high = point.linear_predictor_interval
+def _at(request: OperatingPointRequest, point: KnownPoint, shift: float, basis: str) -> OperatingPoint:
+    low, high = (None if end is None else probability_of(end + shift) for end in point.linear_predictor_interval)
     return OperatingPoint(
         request,
         probability_of(point.linear_predictor + shift),
-        (probability_of(high + shift), probability_of(low + shift)),
+        (high, low),  # a larger linear predictor is a smaller risk
         point.sensitivity,
         point.specificity,
-        "published",
+        basis,
     )
 
 
-def _interpolated(
-    request: OperatingPointRequest, below: PublishedPoint, above: PublishedPoint, shift: float
-) -> OperatingPoint:
+def _interpolated(request: OperatingPointRequest, below: KnownPoint, above: KnownPoint, shift: float) -> OperatingPoint:
     assert request.sensitivity is not None
     share = (request.sensitivity - below.sensitivity) / (above.sensitivity - below.sensitivity)
 
     def between(low: float, high: float) -> float:
         return probability_of(low + share * (high - low) + shift)
 
-    ends = tuple(between(below.linear_predictor_interval[i], above.linear_predictor_interval[i]) for i in (1, 0))
+    (low0, high0), (low1, high1) = below.linear_predictor_interval, above.linear_predictor_interval
+    assert low0 is not None  # published intervals are whole
+    assert high0 is not None
+    assert low1 is not None
+    assert high1 is not None
     return OperatingPoint(
         request,
         between(below.linear_predictor, above.linear_predictor),
-        (ends[0], ends[1]),
+        (between(high0, high1), between(low0, low1)),
         request.sensitivity,
         None,
         "interpolated",

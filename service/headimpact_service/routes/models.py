@@ -9,7 +9,7 @@ from starlette.responses import Response
 
 from headimpact.criteria import BY_KEY
 from headimpact.errors import UnknownModel
-from headimpact.risk import PUBLISHED_MODELS, PublishedPoint, RiskModel, critical_values, load_model, probability_of
+from headimpact.risk import PUBLISHED_MODELS, KnownPoint, RiskModel, critical_values, load_model, probability_of
 from headimpact_service.answers import answer
 from headimpact_service.errors import not_found
 from headimpact_service.operation import Answer, Call, Routes
@@ -44,9 +44,12 @@ class ModelPointView(BaseModel):
     sensitivity: float
     specificity: float | None
     threshold: float = Field(description="The probability from which on it is exceeded, at the model's incidence.")
-    threshold_interval: list[float] = Field(description="What the source's rounding leaves open.")
+    threshold_interval: list[float | None] = Field(
+        description="What the source's rounding leaves open, or the size of the cohort; null for an end that it cannot "
+        "bound."
+    )
     linear_predictor: float
-    linear_predictor_interval: list[float]
+    linear_predictor_interval: list[float | None]
     axis_intercepts: list[float]
     printed: str
 
@@ -137,13 +140,13 @@ def _curve(model: RiskModel, key: str) -> dict[str, Any]:
     }
 
 
-def _point(point: PublishedPoint) -> dict[str, Any]:
+def _point(point: KnownPoint) -> dict[str, Any]:
     low, high = point.linear_predictor_interval
     return {
         "sensitivity": point.sensitivity,
         "specificity": point.specificity,
         "threshold": probability_of(point.linear_predictor),
-        "threshold_interval": [probability_of(high), probability_of(low)],
+        "threshold_interval": [None if end is None else probability_of(end) for end in (high, low)],
         "linear_predictor": point.linear_predictor,
         "linear_predictor_interval": [low, high],
         "axis_intercepts": list(point.axis_intercepts),
