@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -35,12 +36,18 @@ CONVENTIONS: Mapping[str, str] = {
 
 Components = tuple[float, float, float]
 
+NORMAL_975 = 1.959963984540054
+"""The 97.5th percentile of the standard normal distribution."""
+
 
 NO_RISKS: Mapping[str, float] = {}
 
 
 class CriterionScore(NamedTuple):
-    """One criterion of one impact: `value` and `probability` are None, with the `reason`, where it cannot be had."""
+    """One criterion of one impact: `value` and `probability` are None, with the `reason`, where it cannot be had.
+
+    `probability_interval` is the 95 % interval that a fitted model's covariance leaves; None for a published one.
+    """
 
     key: str
     value: float | Components | None
@@ -50,6 +57,7 @@ class CriterionScore(NamedTuple):
     window_ms: tuple[float, float] | None = None
     reason: str | None = None
     risks: Mapping[str, float] = NO_RISKS
+    probability_interval: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +162,7 @@ class _Table:
         self._values: list[list[list[float]]] = values.tolist()
         self._predictors: list[list[float]] = predictors.tolist()
         self._probabilities: list[list[float]] = expit(-predictors).tolist()
+        self._intervals = _intervals(values, predictors, model)
         self._windows = {key: (start.tolist(), stop.tolist()) for key, (start, stop) in evaluation.windows.items()}
         self._peaks: dict[str, list[float]] = dict(zip(motion.signals, motion.peaks.tolist(), strict=True))
         self._resultants, self._angle_peaks = _angle_rows(evaluation)
@@ -186,8 +195,20 @@ class _Table:
             reason = f"Model {self._model.version} has no curve for it."
             return CriterionScore(key, value, criterion.unit, window_ms=window, reason=reason)
         return CriterionScore(
-            key, value, criterion.unit, self._probabilities[row][column], self._predictors[row][column], window
+            key,
+            value,
+            criterion.unit,
+            self._probabilities[row][column],
+            self._predictors[row][column],
+            window,
+            probability_interval=self._interval(row, column),
         )
+
+    def _interval(self, row: int, column: int) -> tuple[float, float] | None:
+        if self._intervals is None:
+            return None
+        low, high = self._intervals[row][column]
+        return None if isnan(low) else (low, high)
 
     def _window(self, row: int, key: str) -> tuple[float, float] | None:
         starts, stops = self._windows[key]
@@ -240,6 +261,23 @@ def _linear_predictors(values: FloatArray, model: RiskModel, shift: float) -> Fl
     total += b0
     total += shift
     return total
+
+
+def _intervals(values: FloatArray, predictors: FloatArray, model: RiskModel) -> list[list[list[float]]] | None:
+    """The interval of each probability, impacts x criteria x 2; None where the model gives none.
+
+    The variance of a linear predictor is x'Vx, summed term by term so that a batch rounds as each impact alone does.
+    """
+    covariances = model.covariances
+    if covariances is None:
+        return None
+    x = [np.ones(values.shape[:2]), values[..., 0], values[..., 1], values[..., 2]]
+    variance = np.zeros(values.shape[:2])
+    for i in range(4):
+        for j in range(4):
+            variance += x[i] * covariances[:, i, j] * x[j]
+    half = NORMAL_975 * np.sqrt(np.maximum(variance, 0.0))
+    return np.stack((expit(-(predictors + half)), expit(-(predictors - half))), axis=-1).tolist()  # type: ignore[no-any-return]
 
 
 def _angle_rows(evaluation: Evaluation) -> tuple[list[float], list[list[int]] | None]:

@@ -1,4 +1,4 @@
-"""`headimpact`: serve, migrate, make keys, score a file, import files, write the API's description."""
+"""`headimpact`: serve, migrate, make keys, score or import files, refit the risk model, write the API's description."""
 
 from __future__ import annotations
 
@@ -152,6 +152,82 @@ def import_files(
         paths, given, organisation=organisation, mode=mode.value, dry_run=dry_run, database_url=database_url
     )
     raise typer.Exit(code)
+
+
+class Sampling(StrEnum):
+    """How the impacts of a cohort were chosen."""
+
+    CASE_CONTROL = "case_control"
+    FULL_FOLLOW_UP = "full_follow_up"
+
+
+class BiasCorrection(StrEnum):
+    """What is done about the bias of few events; zelig reproduces the paper."""
+
+    KING_ZENG = "king_zeng"
+    FIRTH = "firth"
+    ZELIG = "zelig"
+    NONE = "none"
+
+
+class Include(StrEnum):
+    """Impacts that enter a cohort only where they are asked for."""
+
+    UNVERIFIED = "unverified"
+    FALSE_POSITIVE = "false_positive"
+    NOT_WORN = "not_worn"
+
+
+@app.command()
+def refit(
+    table: Annotated[Path, typer.Option(help="CSV or Parquet: athlete_id, outcome, and columns of criteria.")],
+    out: Annotated[Path, typer.Option(help="Folder for report.json, report.html and model.json.")],
+    criterion: Annotated[
+        list[str] | None, typer.Option(help="May be repeated; hic15+bric fits both together. All unless given.")
+    ] = None,
+    sampling: Annotated[Sampling, typer.Option(help="How the impacts were chosen.")] = Sampling.CASE_CONTROL,
+    incidence: Annotated[
+        float | None, typer.Option(help="Concussions per impact that a case-control sample is corrected to.")
+    ] = None,
+    incidence_range: Annotated[
+        tuple[float, float] | None, typer.Option(help="Its least and greatest, for the range of the intercept.")
+    ] = None,
+    bias_correction: Annotated[
+        BiasCorrection, typer.Option(help="Of the bias of few events.")
+    ] = BiasCorrection.KING_ZENG,
+    replicas: Annotated[int, typer.Option(help="Bootstrap resamples, by impact and by athlete each.")] = 1000,
+    folds: Annotated[
+        Path | None, typer.Option(help="Lines athlete_id,fold; five folds are drawn unless given.")
+    ] = None,
+    resamples: Annotated[
+        Path | None, typer.Option(help="Row numbers from 0 of each resample by impact, one resample a line.")
+    ] = None,
+    sensitivity: Annotated[
+        list[float] | None, typer.Option(help="May be repeated; thresholds are found for it. 0.5 and 0.9 unless given.")
+    ] = None,
+    include: Annotated[list[Include] | None, typer.Option(help="May be repeated.")] = None,
+    active: Annotated[
+        str | None, typer.Option(help="Compare with a published model's version, or with a model's file.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 0,
+    version: Annotated[str | None, typer.Option(help="What the model is called.")] = None,
+) -> None:
+    """Fit a risk model to a table of criteria with outcomes; no service is needed."""
+    from headimpact_service.cli import refit as command
+
+    options = {
+        "criteria": tuple(criterion or ()),
+        "sampling": sampling.value,
+        "incidence": incidence,
+        "incidence_range": incidence_range,
+        "bias_correction": bias_correction.value,
+        "replicas": replicas,
+        "seed": seed,
+        "sensitivity_targets": None if sensitivity is None else tuple(sensitivity),
+    }
+    given = {name: value for name, value in options.items() if value is not None}
+    wanted = frozenset(kind.value for kind in include or ())
+    command.run(table, out, command.Request(given, wanted, folds, resamples, active, version))
 
 
 @app.command()

@@ -34,7 +34,7 @@ class Cohort:
     position
         Where each impact stood when it came in; n.
     digest
-        SHA-256 of what the cohort holds, or of what whoever made it says that it is.
+        SHA-256 of what the cohort holds: athletes, outcomes, values, and ids with revisions where they are known.
     """
 
     outcome: FloatArray
@@ -103,7 +103,7 @@ def make_cohort(
     athletes: Sequence[str],
     criteria: Mapping[str, FloatArray],
     *,
-    digest: str | None = None,
+    identities: Sequence[str] = (),
 ) -> Cohort:
     """Put impacts into the cohort's own order.
 
@@ -115,9 +115,8 @@ def make_cohort(
         The athlete of each impact; n.
     criteria
         By key, n x 1 or n x 3, NaN where an impact lacks the criterion. An infinite value counts as lacking.
-    digest
-        What identifies the cohort, where its source knows more than the values (revisions, labels); else it is made
-        from the values.
+    identities
+        What each impact is known by, with its revision, where its source knows that: it enters the digest; n.
 
     Raises
     ------
@@ -146,13 +145,16 @@ def make_cohort(
         tuple(names.tolist()),
         ordered,
         order,
-        digest or _digest(names.tolist(), sorted_outcome, ordered),
+        _digest(names.tolist(), sorted_outcome, ordered, sorted(identities)),
     )
 
 
-def _digest(athletes: Sequence[str], outcome: FloatArray, criteria: Mapping[str, FloatArray]) -> str:
+def _digest(
+    athletes: Sequence[str], outcome: FloatArray, criteria: Mapping[str, FloatArray], identities: Sequence[str]
+) -> str:
     found = hashlib.sha256()
-    for part in ("\n".join(athletes).encode(), outcome.astype("<f8").tobytes()):
+    texts = ("\n".join(athletes).encode(), "\n".join(identities).encode())
+    for part in (*texts, outcome.astype("<f8").tobytes()):
         found.update(b"%d:" % len(part) + part)
     for key, values in criteria.items():
         found.update(key.encode() + b":" + values.astype("<f8").tobytes())

@@ -55,6 +55,8 @@ class Auc:
     def clustered_variance(self, y: FloatArray, clusters: NDArray[np.intp]) -> float:
         """Variance where impacts of one athlete are alike (Obuchowski 1997).
 
+        NaN where fewer than two athletes have events, or fewer than two have others.
+
         Parameters
         ----------
         y
@@ -68,6 +70,8 @@ class Auc:
         sum1 = np.bincount(events, self.of_events, count) - n1 * self.value
         sum0 = np.bincount(others, self.of_others, count) - n0 * self.value
         with1, with0 = np.count_nonzero(n1), np.count_nonzero(n0)
+        if min(with1, with0) < 2:
+            return float("nan")
         m1, m0 = n1.sum(), n0.sum()
         s11 = with1 / (with1 - 1) * float(sum1 @ sum1) / m1**2
         s00 = with0 / (with0 - 1) * float(sum0 @ sum0) / m0**2

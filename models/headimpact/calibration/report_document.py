@@ -175,14 +175,11 @@ def _firth(one: CriterionRefit, names: list[str]) -> dict[str, Any]:
 
 
 def _auc(one: CriterionRefit, level: float, found: Refit) -> dict[str, Any]:
-    clustered = None
-    if one.sample.events > 1:
-        clustered = one.auc.clustered_variance(one.sample.y, _clusters(one, found))
     return {
         "value": one.auc.value,
         "interval": list(one.auc.interval(level)),
         "delong_variance": one.auc.variance,
-        "clustered_variance": clustered,
+        "clustered_variance": one.auc.clustered_variance(one.sample.y, _clusters(one, found)),
         "bootstrap_interval": _pair(percentile_interval(one.by_impact.areas.auc, level)),
         "bootstrap_interval_by_athlete": _pair(percentile_interval(one.by_athlete.areas.auc, level)),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
+from headimpact.errors import HeadimpactError, ModelDocumentError
 from headimpact_service.errors import Problem
 from headimpact_service.store.database import DatabaseUrlError
 from headimpact_service.store.migrate import MigrationError
@@ -18,7 +19,9 @@ def explain(error: Exception) -> tuple[str, int]:
         return problem_line(error), USAGE
     if isinstance(error, ValidationError):
         return _setting_line(error), USAGE
-    if isinstance(error, DatabaseUrlError | MigrationError | ValueError):
+    if isinstance(error, ModelDocumentError):
+        return f"{error.pointer or 'model'}: {error}", USAGE
+    if isinstance(error, DatabaseUrlError | MigrationError | HeadimpactError | ValueError):
         return str(error), USAGE
     if isinstance(error, OSError):
         return f"{error.strerror or error}{f': {error.filename}' if error.filename else ''}", USAGE

@@ -13,7 +13,6 @@ from conforming import document
 from sending import Api, impact_body, score_body
 
 from headimpact.criteria import CRITERION_KEYS
-from headimpact_service import __main__ as command_line
 from headimpact_service.deps import SCOPES
 from headimpact_service.pages.problems import as_markdown
 from headimpact_service.store import keys
@@ -22,27 +21,6 @@ from headimpact_service.store.database import Database
 Run = Callable[..., tuple[int, str, str]]
 
 SWA = "Date,Time,Session ID,Player ID,Sensor ID,Impact ID,Sample Num,Linear Acc x g,Linear Acc y g,Linear Acc z g\n"
-
-
-@pytest.fixture
-def run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., tuple[int, str, str]]:
-    """Runs a command in an empty folder: its exit code and what it printed."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "120")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["headimpact", *arguments])
-        code = 0
-        try:
-            command_line.main()
-        except SystemExit as ended:
-            code = int(ended.code or 0)
-        printed = capsys.readouterr()
-        return code, printed.out, printed.err
-
-    return run
 
 
 class TestKeys:

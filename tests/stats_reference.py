@@ -13,7 +13,7 @@ import numpy as np
 from headimpact.calibration.logistic import LogisticFit, Sample, fit
 from headimpact.calibration.resampling import counts_of_clusters, counts_of_rows
 
-FOLDER = Path(__file__).parent.parent / "data" / "stats"
+FOLDER = Path(__file__).parent / "data" / "stats"
 ROWS: list[dict[str, Any]] = json.loads((FOLDER / "reference_fixture.json").read_text())["results"]
 BY_ID = {row["id"]: row for row in ROWS}
 

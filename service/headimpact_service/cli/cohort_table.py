@@ -1,0 +1,256 @@
+"""A table of criteria with outcomes, CSV or Parquet, as a cohort: the columns of the flat export of impacts."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from headimpact.calibration import Cohort, make_cohort
+from headimpact.calibration.eligibility import exclusion_reason, outcome_of
+from headimpact.criteria import BY_KEY, CRITERION_KEYS
+from headimpact.errors import CalibrationError
+
+REQUIRED = ("athlete_id", "outcome")
+READ_TOO = ("id", "revision", "event", "athlete_consent", "worn")
+PARQUET_MAGIC = b"PAR1"
+GZIP_MAGIC = b"\x1f\x8b"
+FORMULA_GUARD = "'"
+"""What our export puts before a cell that a spreadsheet would take for a formula."""
+
+
+class TableError(ValueError):
+    """A table that cannot be read as a cohort; the message names the column and the row."""
+
+
+@dataclass(frozen=True, slots=True)
+class CohortTable:
+    """A cohort, and what was not taken from its table.
+
+    Parameters
+    ----------
+    cohort
+        The impacts that enter.
+    row_numbers
+        The 0-based row of the table that each stood in, in the order in which they came in.
+    rows
+        Rows of the table.
+    excluded
+        How many rows stayed out, by reason.
+    ignored
+        Columns that nothing is made of.
+    """
+
+    cohort: Cohort
+    row_numbers: tuple[int, ...]
+    rows: int
+    excluded: Mapping[str, int]
+    ignored: tuple[str, ...]
+
+    def resamples(self, drawn: Sequence[Sequence[int]]) -> list[list[int]]:
+        """Rows of the table as positions among those that entered.
+
+        Raises
+        ------
+        TableError
+            A resample draws a row that is not in the cohort.
+        """
+        position = {number: i for i, number in enumerate(self.row_numbers)}
+        found = []
+        for line, rows in enumerate(drawn, start=1):
+            absent = next((row for row in rows if row not in position), None)
+            if absent is not None:
+                raise TableError(f"Resample {line} draws row {absent}, which is not in the cohort.")
+            found.append([position[row] for row in rows])
+        return found
+
+
+def read_cohort(path: Path, include: frozenset[str] = frozenset()) -> CohortTable:
+    """Read a table.
+
+    Parameters
+    ----------
+    path
+        A CSV file (gzip or not) or a Parquet file, told apart by its content.
+    include
+        Kinds of impacts that enter only where they are asked for.
+
+    Raises
+    ------
+    TableError
+        A column is missing, or a cell is not what its column holds.
+    CalibrationError
+        No row of the table enters.
+    """
+    columns = _columns(path)
+    missing = [name for name in REQUIRED if name not in columns]
+    if missing:
+        raise TableError(f"The table has no column {missing[0]}; its columns are: {', '.join(list(columns)[:30])}.")
+    keys = _criteria(columns)
+    outcome = [_outcome(cell, row) for row, cell in enumerate(columns["outcome"])]
+    reasons = _exclusions(columns, outcome, include)
+    entering = [row for row, reason in enumerate(reasons) if reason is None]
+    athletes = _athletes(columns, entering)
+    criteria = {key: np.stack([_numbers(columns, name, entering) for name in keys[key]], axis=1) for key in keys}
+    excluded = Counter(reason for reason in reasons if reason is not None)
+    if not entering:
+        told = ", ".join(f"{count} {reason}" for reason, count in sorted(excluded.items()))
+        raise CalibrationError("no-impacts", f"No row of the table enters the cohort ({told or 'it has no rows'}).")
+    known = np.array([outcome[row] for row in entering], dtype=np.float64)
+    read = {name for names in keys.values() for name in names} | {*REQUIRED, *READ_TOO}
+    return CohortTable(
+        make_cohort(known, athletes, criteria, identities=_identities(columns, entering)),
+        tuple(entering),
+        len(outcome),
+        dict(sorted(excluded.items())),
+        tuple(name for name in columns if name not in read),
+    )
+
+
+def _columns(path: Path) -> dict[str, list[Any]]:
+    """The table's cells by column: text where it is separated text."""
+    with path.open("rb") as file:
+        magic = file.read(4)
+    if magic == PARQUET_MAGIC:
+        return _parquet_columns(path)
+    content = path.read_bytes()
+    try:
+        text = (gzip.decompress(content) if magic[:2] == GZIP_MAGIC else content).decode("utf-8-sig")
+        return _csv_columns(csv.reader(io.StringIO(text, newline=""), strict=True))
+    except (UnicodeDecodeError, EOFError, zlib.error, gzip.BadGzipFile):
+        raise TableError("The table is neither Parquet nor text in UTF-8.") from None
+    except csv.Error as error:
+        raise TableError(f"The table is no separated text: {error}.") from None
+
+
+def _csv_columns(lines: Iterator[list[str]]) -> dict[str, list[Any]]:
+    names = [name.strip() for name in next(lines, [])]
+    _require_distinct(names)
+    columns: list[list[str]] = [[] for _ in names]
+    row = 0
+    for cells in lines:
+        if not cells:
+            continue
+        if len(cells) != len(names):
+            raise TableError(f"Row {row} has {len(cells)} cells where the table has {len(names)} columns.")
+        for column, cell in zip(columns, cells, strict=True):
+            column.append(cell.strip())
+        row += 1
+    return dict(zip(names, columns, strict=True))
+
+
+def _parquet_columns(path: Path) -> dict[str, list[Any]]:
+    try:
+        # Here, since a service without the extra reads CSV all the same.
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise TableError("Parquet needs an extra that is not installed here: headimpact[files].") from None
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise TableError(f"The table is no readable Parquet file: {error}".splitlines()[0]) from None
+    _require_distinct(table.column_names)
+    return {name: table.column(name).to_pylist() for name in table.column_names}
+
+
+def _require_distinct(names: Sequence[str]) -> None:
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise TableError(f"The table has the column {twice[0] or 'without a name'} twice.")
+
+
+def _criteria(columns: Mapping[str, Any]) -> dict[str, list[str]]:
+    """The columns of each criterion that the table has."""
+    found = {}
+    for key in CRITERION_KEYS:
+        names = [key] if BY_KEY[key].components == 1 else [f"{key}_{axis}" for axis in "xyz"]
+        there = [name for name in names if name in columns]
+        if there and there != names:
+            lacking = next(name for name in names if name not in columns)
+            raise TableError(f"The table has {there[0]} but no {lacking}: {key} has three components.")
+        if there:
+            found[key] = names
+    if not found:
+        raise TableError(
+            f"The table has no column of a criterion; such are: bam_x, bam_y, bam_z, {', '.join(CRITERION_KEYS[2:4])}."
+        )
+    return found
+
+
+def _text(cell: Any) -> str:  # noqa: ANN401 - a cell of any type
+    if cell is None or cell != cell:
+        return ""
+    if isinstance(cell, bool):
+        return str(int(cell))
+    text = str(cell).strip()
+    return text[1:] if text.startswith(FORMULA_GUARD) else text
+
+
+def _outcome(cell: Any, row: int) -> float | None:  # noqa: ANN401
+    try:
+        return outcome_of(_text(cell))
+    except CalibrationError as error:
+        raise TableError(f"Row {row}, column outcome: {error}") from None
+
+
+def _exclusions(
+    columns: Mapping[str, Sequence[Any]], outcome: Sequence[float | None], include: frozenset[str]
+) -> list[str | None]:
+    def cells(name: str) -> Sequence[Any]:
+        return columns.get(name) or [None] * len(outcome)
+
+    return [
+        exclusion_reason(found, event=_text(event), consent=_text(consent), worn=_flag(worn, row), include=include)
+        for row, (found, event, consent, worn) in enumerate(
+            zip(outcome, cells("event"), cells("athlete_consent"), cells("worn"), strict=True)
+        )
+    ]
+
+
+def _flag(cell: Any, row: int) -> bool | None:  # noqa: ANN401
+    word = _text(cell).lower()
+    if word not in {"", "true", "false", "1", "0"}:
+        raise TableError(f"Row {row}, column worn: true, false or nothing is needed.")
+    return None if word == "" else word in {"true", "1"}
+
+
+def _athletes(columns: Mapping[str, Sequence[Any]], rows: Sequence[int]) -> list[str]:
+    """The athlete of each row; an impact without one stands for itself."""
+    impacts = columns.get("id")
+    names = []
+    for row in rows:
+        name = _text(columns["athlete_id"][row])
+        names.append(name or (_text(impacts[row]) if impacts else "") or f"row {row}")
+    return names
+
+
+def _numbers(columns: Mapping[str, Sequence[Any]], name: str, rows: Sequence[int]) -> np.ndarray[Any, Any]:
+    found = np.empty(len(rows))
+    for i, row in enumerate(rows):
+        cell = columns[name][row]
+        if cell is None or cell == "":
+            found[i] = nan
+            continue
+        try:
+            found[i] = float(cell)
+        except (TypeError, ValueError):
+            raise TableError(f"Row {row}, column {name}: a number or an empty cell is needed.") from None
+    return found
+
+
+def _identities(columns: Mapping[str, Sequence[Any]], rows: Sequence[int]) -> list[str]:
+    """Id and revision of each impact, as the service knows them; none where the table lacks some."""
+    if "id" not in columns or "revision" not in columns:
+        return []
+    parts = [(_text(columns["id"][row]), _text(columns["revision"][row])) for row in rows]
+    return [] if any("" in part for part in parts) else [" ".join(part) for part in parts]

@@ -1,0 +1,1 @@
+"""What people read: the page of a refit and its figures, made from the refit itself and without any foreign host."""
