@@ -21,12 +21,14 @@ from headimpact_service.pages import docs, problems
 from headimpact_service.routes import (
     athletes,
     devices,
+    diagnoses,
     health,
     impact_parts,
     impacts,
     imports,
     jobs,
     keys,
+    labels,
     models,
     scoring,
     settings,
@@ -40,9 +42,11 @@ _MODULES = (
     scoring,
     impacts,
     impact_parts,
+    labels,
     imports,
     jobs,
     athletes,
+    diagnoses,
     devices,
     models,
     keys,
@@ -51,25 +55,7 @@ _MODULES = (
     problems,
     docs,
 )
-OPERATIONS: tuple[Operation, ...] = tuple(
-    operation
-    for module in (
-        scoring,
-        impacts,
-        impact_parts,
-        imports,
-        jobs,
-        athletes,
-        devices,
-        models,
-        keys,
-        settings,
-        health,
-        problems,
-        docs,
-    )
-    for operation in module.routes.operations
-)
+OPERATIONS: tuple[Operation, ...] = tuple(operation for module in _MODULES for operation in module.routes.operations)
 
 
 def create_app(configured: Settings, database: Database, engine: deps.JobEngine | None = None) -> FastAPI:

@@ -104,6 +104,12 @@ PROBLEMS: Mapping[str, ProblemType] = MappingProxyType(
             "What was asked for contradicts what is stored; `detail` says how.",
             "Read the resource and decide again.",
         ),
+        "label-conflict": ProblemType(
+            409,
+            "The label contradicts another",
+            "What is said of an impact does not fit what is said of it, or of its session, already; `detail` says how.",
+            "Read the label and its history, decide which of both holds, and take the other back first.",
+        ),
         "external-id-conflict": ProblemType(
             409,
             "This external_id is taken",

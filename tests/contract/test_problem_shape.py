@@ -38,6 +38,11 @@ def renamed(api: Api) -> httpx.Response:
     return api.put(address, json=impact_body("e-2", scale=2.0), headers={"If-Match": '"1"'})
 
 
+def diagnosed_without_impacts(api: Api) -> httpx.Response:
+    athlete = api.post("/v1/athletes", json={}).json()["id"]
+    return api.post(f"/v1/athletes/{athlete}/diagnoses", json={"session_id": SECRET})
+
+
 def taken(api: Api) -> httpx.Response:
     api.create("e-1")
     return api.post("/v1/impacts", json=impact_body("e-1", scale=2.0))
@@ -80,6 +85,7 @@ WAYS: list[tuple[str, str, Way]] = [
     ("method-not-allowed", "HEAD", lambda api: api.send("PUT", "/livez")),
     ("not-acceptable", "a picture", lambda api: api.get("/v1/impacts", headers={"Accept": "image/png"})),
     ("conflict", "another external_id", renamed),
+    ("label-conflict", "a diagnosis without an impact", diagnosed_without_impacts),
     ("external-id-conflict", "other content", taken),
     ("impact-deleted", "after its deletion", deleted),
     ("precondition-failed", "a stale ETag", lambda api: corrected(api, {"If-Match": '"7"'})),

@@ -6,9 +6,12 @@ a record in :mod:`.impact_reading`.
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
+
+from headimpact_service.ingest.times import instant
 
 MIN_SAMPLES = 3
 MAX_SAMPLES = 20_000
@@ -22,6 +25,13 @@ MIN_CUT_OFF_HZ = 1.0
 PRINTABLE = r"^[^\u0000-\u001f\u007f]+$"
 
 MAX_NAME = 200
+
+
+def _moment(value: object) -> object:
+    """The instant of a time with its offset; whatever is no text is left to be refused."""
+    return instant(value) if isinstance(value, str) else value
+
+
 Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME, pattern=PRINTABLE)]
 Text = Annotated[str, Field(min_length=1, max_length=2000, pattern=PRINTABLE)]
 Word = Annotated[str, Field(min_length=1, max_length=64, pattern=PRINTABLE)]
@@ -29,6 +39,7 @@ Word = Annotated[str, Field(min_length=1, max_length=64, pattern=PRINTABLE)]
 Samples = Annotated[list[float], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES, fail_fast=True)]
 # Null is a missing sample, which is taken only where it is to be filled or the record is not to be scored.
 Components = Annotated[list[float | None], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES, fail_fast=True)]
+Moment = Annotated[datetime, BeforeValidator(_moment)]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]

@@ -71,6 +71,7 @@ class AthleteTombstone(BaseModel):
     revision: int
     updated_at: datetime
     deleted_at: datetime
+    merged_into: str | None = Field(description="The athlete who has the impacts now, where two were merged.")
 
 
 class AthleteList(BaseModel):
@@ -193,6 +194,33 @@ async def erase_athlete(call: Call) -> Response:
     return no_content()
 
 
+class MergeBody(Strict):
+    """Who somebody turned out to be."""
+
+    into: Name = Field(description="Our id of the athlete who stays.", examples=["ath_01kab3fz8c9vqt5n2m7d4xw6ye"])
+
+
+@routes(
+    "POST",
+    "/v1/athletes/{athlete_id}/merge",
+    "Merge an athlete into another",
+    "athletes:write",
+    {200: Answer(AthleteView, "The athlete who stays.", headers=ETAG)},
+    body=MergeBody,
+    request_headers=IF_MATCH,
+    problems=("not-found", "conflict", "precondition-failed"),
+)
+async def merge_athletes(call: Call) -> Response:
+    """Impacts go over with their history and labels. Impacts sent later under the other's external id follow them."""
+    athlete_id, revision = _id(call), if_match(call.request)
+    into = deps.identifier("ath", call.body.into, "athlete")
+    merged = await deps.write(
+        call.request, lambda conn: athletes.merge(conn, call.data_set_id, athlete_id, into, if_match=revision)
+    )
+    call.request.app.state.facts.forget()
+    return answer(document(merged), headers=etag(merged.revision))
+
+
 def _id(call: Call) -> bytes:
     return deps.identifier("ath", call.path("athlete_id"), "athlete")
 
@@ -206,7 +234,8 @@ def document(athlete: Athlete) -> dict[str, Any]:
     athlete_id = ids.encode("ath", athlete.id)
     if athlete.deleted_at is not None:
         times = {"updated_at": athlete.updated_at, "deleted_at": athlete.deleted_at}
-        return {"id": athlete_id, "revision": athlete.revision, **times}
+        merged = None if athlete.merged_into is None else ids.encode("ath", athlete.merged_into)
+        return {"id": athlete_id, "revision": athlete.revision, **times, "merged_into": merged}
     return {
         "id": athlete_id,
         **{name: getattr(athlete, name) for name in _FIELDS},

@@ -69,6 +69,9 @@ class ImpactView(Shape):
     kinematics: KinematicsView
     source: dict[str, Any] = Field(description="The form it came in, and what its file said besides.")
     duplicate_of: str | None = Field(description="An earlier impact with the same signals.")
+    outcome: Literal["concussion", "no_concussion", "unknown"] | None = Field(
+        description="What its label says; null as long as nobody has labelled it."
+    )
     revision: int
     created_at: datetime
     updated_at: datetime
@@ -109,6 +112,7 @@ def impact_document(impact: Impact) -> dict[str, Any]:
     document["kinematics"] = kinematics_document(impact.document)
     document["source"] = impact.document["metadata"]
     document["duplicate_of"] = None if impact.duplicate_of is None else ids.encode("imp", impact.duplicate_of)
+    document["outcome"] = impact.outcome
     document["revision"] = impact.revision
     document["created_at"] = impact.created_at
     document["updated_at"] = impact.updated_at
@@ -160,9 +164,11 @@ COLUMNS = (
     "created_at",
     "updated_at",
     "deleted_at",
+    "event",
+    "athlete_consent",
     *_REST,
 )
-"""Of an impact as a row of a table. `outcome` is empty as long as nobody has labelled the impact."""
+"""Of an impact as a row of a table. `outcome` and `event` are empty as long as nobody has labelled the impact."""
 NUMBERS = CONTEXT_NUMBERS | {
     "incidence",
     *VALUE_COLUMNS,
@@ -182,7 +188,7 @@ def impact_cells(impact: Impact) -> list[Cell]:
         impact.external_id,
         None if impact.athlete_id is None else ids.encode("ath", impact.athlete_id),
         impact.occurred_at,
-        None,
+        impact.outcome,
         impact.athlete_external_id,
         impact.device_serial,
         impact.session_id,
@@ -196,6 +202,8 @@ def impact_cells(impact: Impact) -> list[Cell]:
         impact.created_at,
         impact.updated_at,
         impact.deleted_at,
+        impact.event,
+        impact.athlete_consent,
         *((impact.context or {}).get(name) for name in _REST),
     ]
 

@@ -7,14 +7,15 @@ from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any, Literal
 
-from sqlalchemy import Connection, RowMapping, bindparam, insert, select, update
+from sqlalchemy import Connection, RowMapping, bindparam, delete, insert, select, update
 
 from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import erasure, ids
 from headimpact_service.store.clock import next_change
+from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.paging import Page, Position, keyset, page_of
 from headimpact_service.store.revision import require_revision
-from headimpact_service.store.tables import athletes
+from headimpact_service.store.tables import athletes, diagnoses, impact_revisions, impacts
 
 Consent = Literal["granted", "withdrawn"]
 
@@ -43,12 +44,42 @@ class Athlete(AthleteFields):
     created_at: datetime
     updated_at: datetime
     deleted_at: datetime | None
+    merged_into: bytes | None = None
 
 
 _NOTHING: dict[str, Any] = asdict(AthleteFields())
 _COLUMNS = [column for column in athletes.c if column.name != "data_set_id"]
 _ATHLETE = select(*_COLUMNS).where(athletes.c.data_set_id == bindparam("data_set_id"))
 _BY_ID = _ATHLETE.where(athletes.c.id == bindparam("athlete_id"), athletes.c.deleted_at.is_(None))
+_FORGET_MERGED = (
+    update(athletes)
+    .where(athletes.c.data_set_id == bindparam("of_data_set"), athletes.c.merged_into == bindparam("athlete"))
+    .values(external_id=None)
+)
+_FORGET_DIAGNOSES = delete(diagnoses).where(
+    diagnoses.c.data_set_id == bindparam("of_data_set"), diagnoses.c.athlete_id == bindparam("athlete")
+)
+_MOVE = [
+    update(table)
+    .where(table.c.data_set_id == bindparam("of_data_set"), table.c.athlete_id == bindparam("source"))
+    .values(athlete_id=bindparam("target"))
+    for table in (impact_revisions, diagnoses)
+]
+_FOLLOW = (
+    update(athletes)
+    .where(athletes.c.data_set_id == bindparam("of_data_set"), athletes.c.merged_into == bindparam("source"))
+    .values(merged_into=bindparam("target"))
+)
+_IMPACTS_OF = (
+    select(impacts.c.id)
+    .where(impacts.c.data_set_id == bindparam("data_set_id"), impacts.c.athlete_id == bindparam("athlete_id"))
+    .order_by(impacts.c.id)
+)
+_MOVE_IMPACT = (
+    update(impacts)
+    .where(impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact"))
+    .values(athlete_id=bindparam("target"))
+)
 _BY_EXTERNAL_ID = _ATHLETE.where(athletes.c.external_id == bindparam("external_id"))
 
 
@@ -75,9 +106,9 @@ def find(conn: Connection, data_set_id: bytes, external_id: str) -> Athlete | No
 
 
 def ensure(conn: Connection, data_set_id: bytes, external_id: str) -> bytes:
-    """The id of the athlete of an external id, made on first sight."""
-    found = find(conn, data_set_id, external_id)
-    return (found or create(conn, data_set_id, AthleteFields(external_id=external_id))).id
+    """The id of the athlete of an external id, made on first sight; of a merged one that of whom it was merged into."""
+    found = find(conn, data_set_id, external_id) or create(conn, data_set_id, AthleteFields(external_id=external_id))
+    return found.merged_into or found.id
 
 
 def page(
@@ -107,7 +138,7 @@ def patch(
     if_match: int | None = None,
 ) -> Athlete:
     """Change the fields of :class:`AthleteFields` that are named; the revision grows only if something changes."""
-    present = _require(conn, data_set_id, athlete_id)
+    present = require(conn, data_set_id, athlete_id)
     require_revision(present.revision, if_match)
     changed = replace(present, **_known(changes))
     if changed == present:
@@ -124,12 +155,61 @@ def erase(conn: Connection, data_set_id: bytes, athlete_id: bytes, *, if_match: 
     What stays are rows that say that something was here and when it went, so that other systems can follow. The
     external id is free for somebody else.
     """
-    present = _require(conn, data_set_id, athlete_id)
+    present = require(conn, data_set_id, athlete_id)
     require_revision(present.revision, if_match)
     erasure.erase_athletes_impacts(conn, data_set_id, athlete_id)
+    conn.execute(_FORGET_MERGED, {"of_data_set": data_set_id, "athlete": athlete_id})
+    conn.execute(_FORGET_DIAGNOSES, {"of_data_set": data_set_id, "athlete": athlete_id})
     now = next_change(conn, athletes, data_set_id)
     gone = replace(present, **_NOTHING, revision=present.revision + 1, updated_at=now, deleted_at=now)
     return _update(conn, gone)
+
+
+def merge(
+    conn: Connection, data_set_id: bytes, athlete_id: bytes, into: bytes, *, if_match: int | None = None
+) -> Athlete:
+    """Two athletes turn out to be one: impacts with their history and labels, and diagnoses, go over to `into`.
+
+    What `into` does not say of itself is taken from the other. The other leaves a tombstone that keeps its external
+    id, so that impacts that are sent under it find their way. A consent that either withdrew is withdrawn.
+    """
+    if athlete_id == into:
+        raise Problem("conflict", "An athlete cannot be merged into itself.")
+    source, target = require(conn, data_set_id, athlete_id), require(conn, data_set_id, into)
+    require_revision(source.revision, if_match)
+    _move_all(conn, data_set_id, athlete_id, into)
+    now = next_change(conn, athletes, data_set_id)
+    nothing = _NOTHING | {"external_id": source.external_id}
+    gone = replace(source, **nothing, revision=source.revision + 1, updated_at=now, deleted_at=now, merged_into=into)
+    _update(conn, gone)
+    conn.execute(_FOLLOW, {"of_data_set": data_set_id, "source": athlete_id, "target": into})
+    merged = replace(target, **_completed(target, source))
+    if merged == target:
+        return target
+    now = next_change(conn, athletes, data_set_id)
+    return _update(conn, replace(merged, revision=target.revision + 1, updated_at=now))
+
+
+def _move_all(conn: Connection, data_set_id: bytes, source: bytes, target: bytes) -> None:
+    moved = conn.execute(_IMPACTS_OF, {"data_set_id": data_set_id, "athlete_id": source}).scalars().all()
+    for statement in _MOVE:
+        conn.execute(statement, {"of_data_set": data_set_id, "source": source, "target": target})
+    first = next_change(conn, impacts, data_set_id)
+    rows = [
+        {"of_data_set": data_set_id, "impact": impact, "target": target, "updated_at": first + number * MICROSECOND}
+        for number, impact in enumerate(moved)
+    ]
+    if rows:
+        conn.execute(_MOVE_IMPACT, rows)
+
+
+def _completed(target: Athlete, source: Athlete) -> dict[str, Any]:
+    """What the target takes over."""
+    taken = {name: getattr(target, name) or getattr(source, name) for name in _NOTHING if name != "external_id"}
+    taken["tags"] = tuple(dict.fromkeys((*target.tags, *source.tags)))
+    if "withdrawn" in {target.consent, source.consent}:
+        taken["consent"] = "withdrawn"
+    return taken
 
 
 def _known(changes: Mapping[str, object]) -> dict[str, Any]:
@@ -149,7 +229,8 @@ def _update(conn: Connection, athlete: Athlete) -> Athlete:
     return athlete
 
 
-def _require(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> Athlete:
+def require(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> Athlete:
+    """An athlete who was not erased, or a `not-found` problem."""
     found = get(conn, data_set_id, athlete_id)
     if found is None:
         raise not_found("athlete")

@@ -6,7 +6,7 @@ from sqlalchemy import Connection, bindparam, delete, select, update
 
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
-from headimpact_service.store.tables import impact_revisions, impacts, scores
+from headimpact_service.store.tables import impact_revisions, impacts, labels, scores
 
 _NOTHING = {
     column.name: None
@@ -16,7 +16,9 @@ _NOTHING = {
 _ENTOMB = update(impacts).where(
     impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact_id")
 )
-_CONTENTS = [delete(table).where(table.c.impact_id == bindparam("impact")) for table in (scores, impact_revisions)]
+_CONTENTS = [
+    delete(table).where(table.c.impact_id == bindparam("impact")) for table in (labels, scores, impact_revisions)
+]
 _REVISION = [
     delete(table).where(table.c.impact_id == bindparam("impact"), table.c.revision == bindparam("number_of_revision"))
     for table in (scores, impact_revisions)
@@ -27,7 +29,7 @@ _MOVED = select(impact_revisions.c.impact_id, impact_revisions.c.revision).where
 
 
 def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes], *, external_ids: bool) -> None:
-    """Delete the traces, scores and revisions of impacts and all they say; with `external_ids` their names too.
+    """Delete the traces, scores, labels and revisions of impacts and all they say; with `external_ids` their names too.
 
     The athlete's id stays, so that whoever follows one athlete's list sees the tombstone, and so does the digest of
     the external id, so that a redelivery does not bring the impact back.

@@ -12,7 +12,7 @@ from sqlalchemy import and_, bindparam, select
 
 from headimpact_service.store import score_rows
 from headimpact_service.store.score_rows import NewScore, Score
-from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts, scores
+from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts, labels, scores
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +66,10 @@ class Impact:
     deleted_at: datetime | None
     document: Mapping[str, Any] | None
     score: Score | None
+    outcome: str | None = None
+    """What the present label says; None where there is none."""
+    event: str | None = None
+    athlete_consent: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +114,9 @@ _NAMES = (
     impacts.c.updated_at,
     impacts.c.deleted_at,
     impact_revisions.c.document,
+    labels.c.outcome,
+    labels.c.event,
+    athletes.c.consent.label("athlete_consent"),
 )
 OF_REVISION = impacts.c.id == impact_revisions.c.impact_id
 """Joins an impact and its revisions."""
@@ -126,6 +133,7 @@ IMPACT = (
         impact_revisions,
         and_(OF_REVISION, impact_revisions.c.revision == impacts.c.revision),
     )
+    .outerjoin(labels, and_(labels.c.impact_id == impacts.c.id, labels.c.superseded_at.is_(None)))
     .outerjoin(scores, and_(scores.c.impact_id == impacts.c.id, scores.c.number == impacts.c.score_number))
     .where(impacts.c.data_set_id == bindparam("data_set_id"))
 )

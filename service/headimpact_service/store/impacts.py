@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from sqlalchemy import BindParameter, Connection, bindparam, insert, select, update
+from sqlalchemy import BindParameter, Connection, bindparam, func, insert, select, update
 
 from headimpact_service.errors import PayloadError, Problem, not_found
 from headimpact_service.store import athletes as athlete_store
@@ -75,7 +75,7 @@ _ATHLETE_BY_ID = (
 _KNOWN = Prepared(
     select(
         last_change(impacts),
-        select(athletes.c.id)
+        select(func.coalesce(athletes.c.merged_into, athletes.c.id))
         .where(athletes.c.data_set_id == _DATA_SET, athletes.c.external_id == bindparam("athlete_external_id"))
         .scalar_subquery(),
         select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sqlalchemy import (
+    Boolean,
     Column,
     Double,
     ForeignKey,
@@ -110,9 +111,17 @@ athletes = Table(
     Column("created_at", Instant, nullable=False),
     Column("updated_at", Instant, nullable=False),
     Column("deleted_at", Instant),
+    # Of an athlete who turned out to be another: the row keeps its external id, so that later impacts find their way.
+    Column("merged_into", Identifier),
     UniqueConstraint("data_set_id", "external_id"),
     Index(None, "data_set_id", "updated_at", "id"),
     Index(None, "data_set_id", "id"),
+)
+Index(
+    "ix_athletes_merged_into",
+    athletes.c.merged_into,
+    sqlite_where=athletes.c.merged_into.is_not(None),
+    postgresql_where=athletes.c.merged_into.is_not(None),
 )
 
 devices = Table(
@@ -212,6 +221,96 @@ scores = Table(
     Column("provenance", Document, nullable=False),
     Column("created_at", Instant, nullable=False),
     ForeignKeyConstraint(["impact_id", "revision"], ["impact_revisions.impact_id", "impact_revisions.revision"]),
+)
+
+labels = Table(
+    "labels",
+    metadata,
+    Column("impact_id", Identifier, primary_key=True),
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("data_set_id", Identifier, nullable=False),
+    # Null where the label was taken back.
+    Column("outcome", String(16)),
+    Column("basis", String(32)),
+    Column("attribution", String(32)),
+    Column("event", String(16)),
+    Column("labelled_by", Text),
+    Column("diagnosis_id", Identifier),
+    Column("key_id", ForeignKey("api_keys.id")),
+    Column("created_at", Instant, nullable=False),
+    Column("superseded_at", Instant),
+    ForeignKeyConstraint(["data_set_id", "impact_id"], ["impacts.data_set_id", "impacts.id"]),
+    Index(None, "data_set_id", "created_at"),
+)
+"""What was said of an impact, one row each time: the last, which nothing superseded, counts."""
+
+diagnoses = Table(
+    "diagnoses",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False),
+    Column("athlete_id", ForeignKey("athletes.id"), nullable=False, index=True),
+    Column("session_id", Text, nullable=False),
+    Column("basis", String(32), nullable=False),
+    Column("diagnosed_at", Instant),
+    Column("diagnosed_by", Text),
+    Column("impact_id", Identifier, nullable=False),
+    Column("key_id", ForeignKey("api_keys.id")),
+    Column("created_at", Instant, nullable=False),
+)
+
+models = Table(
+    "models",
+    metadata,
+    Column("id", Identifier, primary_key=True),
+    Column("data_set_id", ForeignKey("data_sets.id"), nullable=False),
+    Column("version", String(100), nullable=False),
+    Column("document", Document, nullable=False),
+    # Deflated; what a fit found out, its page, and who was in its cohort.
+    Column("report", LargeBinary),
+    Column("page", LargeBinary),
+    Column("cohort", LargeBinary),
+    Column("schedule", String(100)),
+    Column("job_id", Identifier),
+    Column("key_id", ForeignKey("api_keys.id")),
+    Column("created_at", Instant, nullable=False),
+    UniqueConstraint("data_set_id", "version"),
+)
+
+model_aliases = Table(
+    "model_aliases",
+    metadata,
+    Column("data_set_id", ForeignKey("data_sets.id"), primary_key=True),
+    Column("name", String(16), primary_key=True),
+    Column("revision", Integer, primary_key=True, autoincrement=False),
+    Column("version", String(100)),
+    Column("reason", Text, nullable=False),
+    Column("key_id", ForeignKey("api_keys.id")),
+    Column("created_at", Instant, nullable=False),
+    Column("superseded_at", Instant),
+)
+"""What each alias meant, one row each time; the last, which nothing superseded, is what it means."""
+
+schedules = Table(
+    "schedules",
+    metadata,
+    Column("data_set_id", ForeignKey("data_sets.id"), primary_key=True),
+    Column("name", String(100), primary_key=True),
+    Column("cron", String(100), nullable=False),
+    Column("time_zone", String(64), nullable=False),
+    Column("enabled", Boolean, nullable=False),
+    Column("fit", Document, nullable=False),
+    Column("gates", Document, nullable=False),
+    Column("promote", Boolean, nullable=False),
+    Column("next_due", Instant, index=True),
+    Column("last_fired", Instant),
+    Column("last_job_id", Identifier),
+    # Of the cohort of the last fit that this schedule made: the same again teaches nothing.
+    Column("last_digest", Text),
+    Column("revision", Integer, nullable=False),
+    Column("key_id", ForeignKey("api_keys.id")),
+    Column("created_at", Instant, nullable=False),
+    Column("updated_at", Instant, nullable=False),
 )
 
 jobs = Table(

@@ -85,7 +85,7 @@ class TestErase:
         assert api.get(f"/v1/impacts/{impact['id']}").status_code == 404
         since = {"updated_since": "2026-01-01T00:00:00Z"}
         athletes = api.get("/v1/athletes", params=since).json()["data"]
-        assert set(athletes[0]) == {"id", "revision", "updated_at", "deleted_at"}
+        assert set(athletes[0]) == {"id", "revision", "updated_at", "deleted_at", "merged_into"}
         assert api.get("/v1/impacts", params=since).json()["data"][0]["external_id"] is None
         assert api.post("/v1/impacts", json=impact_body("e-1")).status_code == 409
 

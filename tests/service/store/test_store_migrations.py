@@ -30,7 +30,7 @@ def test_the_version_is_committed(database: Database, tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / "headimpact.db") as file:
         versions = file.execute("SELECT version_num FROM alembic_version").fetchall()
     file.close()
-    assert versions == [("0002",)]
+    assert versions == [("0003",)]
 
 
 def test_migrating_twice_changes_nothing(database: Database) -> None:

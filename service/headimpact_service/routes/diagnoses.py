@@ -1,0 +1,111 @@
+"""Diagnoses of a session whose impact nobody saw."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+
+from pydantic import BaseModel, Field
+from starlette.responses import Response
+
+from headimpact_service import deps
+from headimpact_service.answers import answer
+from headimpact_service.ingest.impact_json import Moment, Name, Strict, Text
+from headimpact_service.operation import Answer, Call, Routes
+from headimpact_service.store import diagnoses, ids
+from headimpact_service.store.diagnoses import Diagnosis, NewDiagnosis
+from headimpact_service.store.labels import Basis
+
+routes = Routes("labels")
+
+
+class DiagnosisBody(Strict):
+    """A concussion that was diagnosed after a session."""
+
+    session_id: Text = Field(description="The session that it came of.", examples=["2026-09-12-match"])
+    basis: Basis = "physician_diagnosis"
+    diagnosed_at: Moment | None = Field(None, description="RFC 3339 with an offset.", examples=["2026-09-13T10:00:00Z"])
+    diagnosed_by: Name | None = Field(
+        None, description="Your pseudonym for whoever diagnosed.", examples=["clinician-3"]
+    )
+
+
+class DiagnosisView(BaseModel):
+    """A diagnosis, and the impact that it was attributed to."""
+
+    id: str
+    athlete: str
+    session_id: str
+    basis: Basis
+    diagnosed_at: datetime | None
+    diagnosed_by: str | None
+    impact: str = Field(description="Labelled `concussion`, `assumed_highest_alpha`.")
+    key: str | None
+    created_at: datetime
+
+
+class DiagnosisList(BaseModel):
+    """All diagnoses of an athlete, on one page."""
+
+    data: list[DiagnosisView]
+    next_cursor: None
+
+
+@routes(
+    "POST",
+    "/v1/athletes/{athlete_id}/diagnoses",
+    "Report a diagnosis",
+    "labels:write",
+    {
+        201: Answer(DiagnosisView, "The diagnosis, with the impact that is labelled."),
+        200: Answer(DiagnosisView, "It was reported before."),
+    },
+    body=DiagnosisBody,
+    example={"session_id": "2026-09-12-match", "basis": "physician_diagnosis", "diagnosed_by": "clinician-3"},
+    problems=("not-found", "label-conflict"),
+)
+async def report_diagnosis(call: Call) -> Response:
+    """Labels the session's impact of highest peak angular acceleration, as Laksari et al. 2020 did.
+
+    For a concussion whose impact was seen, label that impact instead.
+    """
+    body: DiagnosisBody = call.body
+    athlete_id = _athlete(call)
+    new = NewDiagnosis(**body.model_dump())
+    made, news = await deps.write(
+        call.request, lambda conn: diagnoses.add(conn, call.data_set_id, athlete_id, new, call.key.id)
+    )
+    return answer(_document(made), 201 if news else 200)
+
+
+@routes(
+    "GET",
+    "/v1/athletes/{athlete_id}/diagnoses",
+    "List an athlete's diagnoses",
+    "labels:read",
+    {200: Answer(DiagnosisList, "All of them, oldest first.")},
+    problems=("not-found",),
+)
+async def list_diagnoses(call: Call) -> Response:
+    """Those whose label was taken back or replaced later too: the impact's label is what holds."""
+    athlete_id = _athlete(call)
+    found = await deps.read(call.request, lambda conn: diagnoses.of_athlete(conn, call.data_set_id, athlete_id))
+    return answer({"data": [_document(one) for one in found], "next_cursor": None})
+
+
+def _athlete(call: Call) -> bytes:
+    return deps.identifier("ath", call.path("athlete_id"), "athlete")
+
+
+def _document(one: Diagnosis) -> dict[str, Any]:
+    return {
+        "id": ids.encode("dia", one.id),
+        "athlete": ids.encode("ath", one.athlete_id),
+        "session_id": one.session_id,
+        "basis": one.basis,
+        "diagnosed_at": one.diagnosed_at,
+        "diagnosed_by": one.diagnosed_by,
+        "impact": ids.encode("imp", one.impact_id),
+        "key": None if one.key_id is None else ids.encode("key", one.key_id),
+        "created_at": one.created_at,
+    }
