@@ -7,8 +7,8 @@ science works in the sign of Table 3 of Laksari et al. 2020, which is the opposi
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,10 @@ _MEMBERS = frozenset(
 )
 _TEXTS = ("version", "title", "source", "population")
 MAX_TEXT = 2000
+MAX_NUMBER = 1e300
+"""Squares and sums of larger ones would overflow."""
+MAX_VERSION = 100
+VERSION = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 def model_to_document(model: RiskModel) -> dict[str, Any]:
@@ -67,7 +71,7 @@ def model_from_text(text: str | bytes) -> RiskModel:
     """
     try:
         document = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         raise ModelDocumentError("", "A model's document is JSON.") from None
     return model_from_document(document)
 
@@ -84,6 +88,8 @@ def model_from_document(document: Any) -> RiskModel:  # noqa: ANN401 - anything 
     if members["format"] != FORMAT:
         raise ModelDocumentError("/format", f"The format must be {FORMAT}.")
     texts = {name: _text(members[name], f"/{name}") for name in _TEXTS}
+    if VERSION.fullmatch(texts["version"]) is None:
+        raise ModelDocumentError("/version", f"A version has 1 to {MAX_VERSION} letters, digits, dots, dashes.")
     incidence = _number(members["incidence"], "/incidence")
     if not 0.0 < incidence < 1.0:
         raise ModelDocumentError("/incidence", "An incidence is above 0 and below 1.")
@@ -169,7 +175,8 @@ def _cohort(document: Any) -> dict[str, Any]:  # noqa: ANN401
     if not isinstance(document, Mapping):
         raise ModelDocumentError("/cohort", "The cohort is an object.")
     for name, value in document.items():
-        if not (value is None or isinstance(value, bool | int | str) or (isinstance(value, float) and isfinite(value))):
+        known = value is None or isinstance(value, bool | str)
+        if not known and not (isinstance(value, int | float) and -MAX_NUMBER <= value <= MAX_NUMBER):
             raise ModelDocumentError(f"/cohort/{name}", "What is said of the cohort is text, a number or null.")
     return dict(document)
 
@@ -192,7 +199,7 @@ def _text(value: Any, place: str) -> str:  # noqa: ANN401
 
 
 def _number(value: Any, place: str) -> float:  # noqa: ANN401
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not -MAX_NUMBER <= value <= MAX_NUMBER:
         raise ModelDocumentError(place, "A finite number is needed.")
     return float(value)
 

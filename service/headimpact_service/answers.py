@@ -13,6 +13,8 @@ JSON = "application/json"
 CSV = "text/csv"
 NDJSON = "application/x-ndjson"
 PARQUET = "application/vnd.apache.parquet"
+HTML = "text/html"
+SVG = "image/svg+xml"
 PROBLEM_JSON = "application/problem+json"
 
 

@@ -15,6 +15,7 @@ from starlette.requests import Request
 
 from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
 from headimpact_service.errors import Problem
+from headimpact_service.intake import registry
 from headimpact_service.intake.scoring import Terms
 from headimpact_service.settings import Settings
 from headimpact_service.store import ids, jobs, keys
@@ -82,7 +83,7 @@ class Gate:
         return caller
 
     def forget(self) -> None:
-        """Look every key up again: one was revoked, or an organisation's settings changed."""
+        """Look every key up again: one was revoked, settings changed, or another model is active."""
         self.remembered.clear()
 
     async def _look_up(self, authorization: str) -> Caller:
@@ -90,18 +91,18 @@ class Gate:
         scheme, _, key = authorization.partition(" ")
         if scheme.lower() != "bearer" or not key.strip():
             raise _unauthenticated("The Authorization header must be `Bearer <key>`.")
-        found = await run_sync(self._find, keys.digest(key.strip()))
-        if found is None:
+        caller = await run_sync(self._find, keys.digest(key.strip()))
+        if caller is None:
             raise _unauthenticated("The key is unknown, expired or revoked.")
-        caller = Caller(found, terms_of(found))
         if len(self.remembered) >= REMEMBERED:
             self.remembered.clear()
         self.remembered[authorization] = (time.monotonic() + REMEMBER_S, caller)
         return caller
 
-    def _find(self, digest: bytes) -> keys.KeyRow | None:
+    def _find(self, digest: bytes) -> Caller | None:
         with self.database.read() as conn:
-            return keys.find_key(conn, digest)
+            found = keys.find_key(conn, digest)
+            return None if found is None else Caller(found, terms_of(conn, found))
 
     def _count(self, key_id: bytes, rate_limit: int) -> None:
         now = time.time()
@@ -119,10 +120,11 @@ def _unauthenticated(detail: str) -> Problem:
     return Problem("unauthenticated", detail, headers={"WWW-Authenticate": 'Bearer realm="headimpact"'})
 
 
-def terms_of(key: keys.KeyRow) -> Terms:
-    """What the key's organisation has its impacts scored with."""
+def terms_of(conn: Connection, key: keys.KeyRow) -> Terms:
+    """What the impacts of the key's data set are scored with."""
     points = tuple(OperatingPointRequest(**point) for point in key.operating_points)  # type: ignore[arg-type]
-    return Terms(incidence=key.incidence, operating_points=points or DEFAULT_OPERATING_POINTS)
+    model = registry.DEFAULT if key.model is None else registry.model_of(conn, key.data_set_id, key.model)
+    return Terms(incidence=key.incidence, operating_points=points or DEFAULT_OPERATING_POINTS, model=model)
 
 
 async def authorize(request: Request, access: str) -> Caller:
@@ -130,8 +132,13 @@ async def authorize(request: Request, access: str) -> Caller:
     gate: Gate = request.app.state.gate
     caller = await gate.caller(request.headers.get("authorization"))
     if access != ANY and access not in caller.key.scopes:
-        raise Problem("insufficient-scope", f"This operation needs a key with the scope {access}.")
+        raise scope_missing(access)
     return caller
+
+
+def scope_missing(scope: str) -> Problem:
+    """The 403 for a key without a scope."""
+    return Problem("insufficient-scope", f"This operation needs a key with the scope {scope}.")
 
 
 class JobEngine(Protocol):

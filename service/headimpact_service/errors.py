@@ -116,6 +116,20 @@ PROBLEMS: Mapping[str, ProblemType] = MappingProxyType(
             "A resource with this `external_id` exists with other content.",
             "Correct an impact with `PUT` and `If-Match`, or give the new one an `external_id` of its own.",
         ),
+        "cohort-changed": ProblemType(
+            409,
+            "The cohort changed while it was fitted",
+            "An impact of the cohort was deleted, corrected, labelled anew, or its athlete withdrew consent, before "
+            "the model could be registered. It is the `problem` of a job, not an answer; nothing was registered.",
+            "Order the fit again.",
+        ),
+        "cohort-unfit": ProblemType(
+            409,
+            "The cohort allows no fit",
+            "Too little is labelled, all outcomes are of one kind, a predictor is constant or separates the outcomes; "
+            "`detail` says what is missing. It is the `problem` of a job, not an answer.",
+            "Label more impacts, widen the cohort, or choose `bias_correction: firth` where outcomes are separated.",
+        ),
         "impact-deleted": ProblemType(
             409,
             "This impact was deleted",

@@ -175,7 +175,7 @@ WAYS: list[tuple[str, str, Way]] = [
 
 ELSEWHERE = {"request-timeout", "too-many-requests", "internal-error", "unavailable"}
 """Below: these need an application or a client of their own."""
-OF_JOBS = {"idempotency-conflict", "job-cancelled", "job-crashed"}
+OF_JOBS = {"cohort-changed", "cohort-unfit", "idempotency-conflict", "job-cancelled", "job-crashed"}
 """What becomes of a job: held by the tests of jobs."""
 
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from headimpact.calibration import Cohort, make_cohort
-from headimpact.calibration.eligibility import exclusion_reason, outcome_of
 from headimpact.criteria import BY_KEY, CRITERION_KEYS
+from headimpact.eligibility import exclusion_reason, outcome_of
 from headimpact.errors import CalibrationError
 
 REQUIRED = ("athlete_id", "outcome")

@@ -21,6 +21,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.upload import read_upload
 from headimpact_service.intake.importing import COUNTED, look_up, make_ready, preview_row, score_found, store, summary
+from headimpact_service.intake.registry import active_model
 from headimpact_service.intake.scoring import Terms
 from headimpact_service.store import organisation_settings, organisations
 from headimpact_service.store.database import Database
@@ -108,8 +109,12 @@ def _target(database: Database, organisation: str, mode: str) -> Target:
         found = organisations.ensure(conn, organisation)
         settings = organisation_settings.get(conn, found.id)
         points = tuple(OperatingPointRequest(**point) for point in settings.operating_points)  # type: ignore[arg-type]
-        terms = Terms(incidence=settings.incidence, operating_points=points or DEFAULT_OPERATING_POINTS)
         data_set = organisations.ensure_data_set(conn, found.id, cast("Literal['live', 'test']", mode))
+        terms = Terms(
+            incidence=settings.incidence,
+            operating_points=points or DEFAULT_OPERATING_POINTS,
+            model=active_model(conn, data_set),
+        )
         return Target(data_set, terms)
 
     return database.write(find)

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from headimpact.calibration import Refit, RefitOptions, fitted_model, refit, report_document
 from headimpact.errors import CalibrationError
-from headimpact.model_document import model_from_text, model_to_document
+from headimpact.model_document import MAX_VERSION, VERSION, model_from_text, model_to_document
 from headimpact.risk import PUBLISHED_MODELS, RiskModel
 from headimpact_service.answers import json_bytes
 from headimpact_service.cli.cohort_table import CohortTable, TableError, read_cohort
@@ -84,6 +84,8 @@ def run(table: Path, out: Path, request: Request) -> None:
 
 def _model(found: Refit, version: str | None) -> RiskModel | None:
     """The model; None where only criteria joined together were fitted, which scoring has no place for."""
+    if version is not None and VERSION.fullmatch(version) is None:
+        raise TableError(f"A version has 1 to {MAX_VERSION} letters, digits, dots, dashes.")
     name = version or f"refit-{found.cohort.digest.removeprefix('sha256:')[:12]}"
     try:
         return fitted_model(found, name)

@@ -77,6 +77,13 @@ def _details(scored: Scored, score: ImpactScore, quality: Iterable[QualityNote])
     missing = {key: found.reason for key, found in criteria.items() if found.reason is not None}
     if missing:
         details["missing"] = missing
+    intervals = {
+        key: list(found.probability_interval)
+        for key, found in criteria.items()
+        if found.probability_interval is not None
+    }
+    if intervals:
+        details["probability_intervals"] = intervals
     if score.brain_angle is not None:
         details["time_of_peak_ms"] = list(score.brain_angle.time_of_peak_ms)
     if score.extra_criteria:
@@ -112,9 +119,12 @@ def _point(point: OperatingPoint, probability: float | None) -> dict[str, Any]:
 
 
 def as_asked(document: dict[str, Any], stored: NewScore, scored: Scored) -> None:
-    """Answer a redelivery's own operating points and extra criteria, on the probabilities that are stored."""
+    """Answer a redelivery's own operating points and extra criteria, on the probabilities that are stored.
+
+    Those of a model that is not in service any more keep the operating points that they were stored with.
+    """
     requests = scored.record.operating_points
-    if requests and stored.state == "scored":
+    if requests and stored.state == "scored" and stored.model == scored.terms.model.version:
         points = [resolve_operating_point(request, scored.terms.model, stored.incidence) for request in requests]
         document["operating_points"] = [
             _point(point, stored.probabilities[point.request.criterion]) for point in points
@@ -181,9 +191,12 @@ def _criteria(score: NewScore) -> dict[str, Any]:
     values, probabilities = score.values, score.probabilities
     windows: Mapping[str, Any] = score.details.get("windows_ms", {})
     missing: Mapping[str, str] = score.details.get("missing", {})
+    intervals: Mapping[str, Any] = score.details.get("probability_intervals", {})
     shown = {}
     for key, unit in _UNITS:
         entry = {"value": _value(values.get(key)), "unit": unit, "probability": probabilities.get(key)}
+        if key in intervals:
+            entry["probability_interval"] = intervals[key]
         if key in windows:
             entry["window_ms"] = windows[key]
         if key in missing:

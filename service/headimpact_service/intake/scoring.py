@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property
 
 from headimpact.criteria.extra import EXTRA_CRITERIA
 from headimpact.errors import OperatingPointUnreachable, TraceError
@@ -26,13 +27,25 @@ from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.trace_errors import trace_problem
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Terms:
     """What an organisation has its impacts scored with."""
 
     incidence: float | None = None
     operating_points: tuple[OperatingPointRequest, ...] = DEFAULT_OPERATING_POINTS
     model: RiskModel = LAKSARI_2020
+
+    @cached_property
+    def known_points(self) -> tuple[OperatingPoint, ...]:
+        """The thresholds of the organisation's operating points, as far as the model has them.
+
+        A model that lacks one that was set is not promoted; the defaults are BAM's, which a model may lack.
+        """
+        found = []
+        for request in self.operating_points:
+            with suppress(OperatingPointUnreachable):
+                found.append(resolve_operating_point(request, self.model, self.incidence))
+        return tuple(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,17 +197,8 @@ _PER_UNIT = {"g": 1.0, "m/s^2": 9.80665, "rad/s": 1.0, "deg/s": 57.2957795130823
 def operating_points(asked: Sequence[OperatingPointRequest] | None, terms: Terms) -> tuple[OperatingPoint, ...]:
     """The thresholds that were asked for, in that order; the organisation's default where none were."""
     if asked is None:
-        return _known_points(terms.operating_points, terms.model.version, terms.incidence)
+        return terms.known_points
     return tuple(_point(request, terms, index) for index, request in enumerate(asked))
-
-
-@lru_cache(maxsize=64)
-def _known_points(
-    requests: tuple[OperatingPointRequest, ...], version: str, incidence: float | None
-) -> tuple[OperatingPoint, ...]:
-    terms = Terms(incidence=incidence)
-    assert terms.model.version == version
-    return tuple(_point(request, terms, index) for index, request in enumerate(requests))
 
 
 def _point(request: OperatingPointRequest, terms: Terms, index: int) -> OperatingPoint:

@@ -1,4 +1,4 @@
-"""The engine inside a process: brings unfinished jobs to be run, takes over from the dead, cleans up at night.
+"""The engine inside a process: fires schedules, brings jobs to be run, takes over from the dead, cleans up at night.
 
 It starts DBOS with the first job, not before: its import costs seconds and some 30 MB.
 """
@@ -15,12 +15,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from headimpact_service.deps import uploads_of
+from headimpact_service.intake.cron import next_due
 from headimpact_service.jobs import runs
+from headimpact_service.jobs.fit import Fit
 from headimpact_service.jobs.import_file import ImportFile
+from headimpact_service.jobs.rescore import Rescore
 from headimpact_service.jobs.runs import House, Kind
 from headimpact_service.jobs.slots import Slot, SlotsTakenError
 from headimpact_service.settings import Settings
-from headimpact_service.store import ids, job_runs
+from headimpact_service.store import ids, job_runs, schedules
 from headimpact_service.store.database import Database
 from headimpact_service.store.jobs import Job
 from headimpact_service.store.uploads import job_folder
@@ -38,7 +41,7 @@ NIGHT = 3
 """The hour of the clean-up (UTC)."""
 OTHERS_AGE_S = 24 * 3600.0
 """Another process may be receiving an upload; one this old is nobody's."""
-KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (ImportFile(),)}
+KINDS: Mapping[str, Kind] = {kind.name: kind for kind in (ImportFile(), Fit(), Rescore())}
 
 
 class Engine:
@@ -94,6 +97,10 @@ class Engine:
         if datetime.now(UTC) >= self._next_night:
             self._clean_up(slot)
             self._next_night = next_night(datetime.now(UTC))
+        with self._house.database.read() as conn:
+            due = schedules.next_due(conn)
+        if due is not None and due <= (now := datetime.now(UTC)):
+            self._house.database.write(lambda conn: schedules.fire(conn, now, next_due))
         with self._house.database.read() as conn:
             unfinished = job_runs.unfinished(conn)
         if unfinished and self._transact is None:

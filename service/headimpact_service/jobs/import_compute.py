@@ -8,11 +8,12 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
+from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest, RiskModel
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.upload import read_upload
 from headimpact_service.intake.importing import Ready, look_up, make_ready, score_found
+from headimpact_service.intake.registry import DEFAULT, model_of
 from headimpact_service.intake.scoring import Terms
 from headimpact_service.store.database import Database
 
@@ -40,13 +41,19 @@ def compute(arguments: dict[str, Any]) -> Iterator[int | Chunk]:
         yield sum(1 for _ in read_upload(path, options))
     database = Database(arguments["database_url"], readers=1)
     try:
-        yield from _chunks(database, read_upload(path, options), size, arguments)
+        with database.read() as conn:
+            # A job that was ordered by a version which knew one model only does not say which.
+            model = model_of(conn, arguments["data_set_id"], arguments.get("model", DEFAULT.version))
+        terms = _terms(arguments["terms"], model)
+        yield from _chunks(database, read_upload(path, options), size, terms, arguments)
     finally:
         database.close()
 
 
-def _chunks(database: Database, found: Iterator[Any], size: int, arguments: dict[str, Any]) -> Iterator[Chunk]:
-    data_set_id, key_id, terms = arguments["data_set_id"], arguments["key_id"], _terms(arguments["terms"])
+def _chunks(
+    database: Database, found: Iterator[Any], size: int, terms: Terms, arguments: dict[str, Any]
+) -> Iterator[Chunk]:
+    data_set_id, key_id = arguments["data_set_id"], arguments["key_id"]
     for number in count():
         part = list(islice(found, size))
         if not part:
@@ -58,6 +65,6 @@ def _chunks(database: Database, found: Iterator[Any], size: int, arguments: dict
         yield Chunk(number, number * size, make_ready(score_found(part, known, terms), key_id))
 
 
-def _terms(sent: dict[str, Any]) -> Terms:
+def _terms(sent: dict[str, Any], model: RiskModel) -> Terms:
     points = tuple(OperatingPointRequest(**point) for point in sent["operating_points"])
-    return Terms(incidence=sent["incidence"], operating_points=points or DEFAULT_OPERATING_POINTS)
+    return Terms(incidence=sent["incidence"], operating_points=points or DEFAULT_OPERATING_POINTS, model=model)

@@ -10,17 +10,16 @@ from anyio.to_thread import run_sync
 from pydantic import Field, RootModel
 from starlette.responses import Response
 
-from headimpact.errors import UnknownModel
 from headimpact.preparation import prepare
 from headimpact.recording import Recording
-from headimpact.risk import load_model
 from headimpact_service import deps
 from headimpact_service.answers import answer
 from headimpact_service.errors import PayloadError, Problem, not_found
 from headimpact_service.ingest.impact_json import MAX_OPERATING_POINTS, OperatingPointBody, Strict, Word
 from headimpact_service.intake.records import raw_traces, rebuild_record
+from headimpact_service.intake.registry import model_of
 from headimpact_service.intake.rendering import brain_trace, head_traces, new_score, score_document
-from headimpact_service.intake.scoring import Terms, score_record
+from headimpact_service.intake.scoring import Terms, operating_points, score_record
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import Query
 from headimpact_service.routes.impacts import identifier, present
@@ -195,7 +194,7 @@ async def create_score(call: Call) -> Response:
     """From the stored trace, so the same model under the same settings gives the same digits."""
     body: NewScoreBody = call.body
     impact, stored = await _with_trace(call)
-    terms = _terms(call, body)
+    terms = await _terms(call, body)
     new = await run_sync(partial(_scored_again, impact, stored, terms, tuple(body.extra_criteria or ())))
     score, made = await deps.write(
         call.request,
@@ -206,16 +205,19 @@ async def create_score(call: Call) -> Response:
     return answer(_document(score, current=current), 201 if made else 200)
 
 
-def _terms(call: Call, body: NewScoreBody) -> Terms:
+async def _terms(call: Call, body: NewScoreBody) -> Terms:
     try:
-        model = load_model(body.model)
-    except UnknownModel:
+        model = await deps.read(call.request, lambda conn: model_of(conn, call.data_set_id, body.model))
+    except Problem:
         detail = "There is no model with this version; GET /v1/models lists them."
         error = PayloadError(detail=detail, code="unknown-model", pointer="/model")
         raise Problem("invalid-payload", detail, errors=[error]) from None
     asked = body.operating_points
     points = call.terms.operating_points if asked is None else requests_of(asked)
-    return Terms(incidence=call.terms.incidence, operating_points=points, model=model)
+    terms = Terms(incidence=call.terms.incidence, operating_points=points, model=model)
+    if asked is not None:
+        operating_points(points, terms)  # one that was asked for is not left out in silence
+    return terms
 
 
 def _scored_again(impact: Impact, stored: bytes, terms: Terms, extra: tuple[str, ...]) -> scores.NewScore:

@@ -76,5 +76,6 @@ def _arguments(call: Call, upload: Upload, sent: Mapping[str, str]) -> dict[str,
         "fields": dict(sent),
         "known": {"filename": upload.filename, "content_type": upload.content_type},
         "terms": {"incidence": call.key.incidence, "operating_points": list(call.key.operating_points)},
+        "model": call.terms.model.version,
         "chunk": CHUNK,
     }

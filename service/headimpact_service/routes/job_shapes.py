@@ -28,14 +28,49 @@ _KEY = re.compile(r"[!-~]{1,200}")
 _RESPOND_ASYNC = re.compile(r"(^|[,;\s])respond-async($|[,;\s])", re.IGNORECASE)
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
-JobKind = Literal["import"]
+JobKind = Literal["import", "fit", "rescore"]
 
 
 class ProgressView(BaseModel):
     """How far a job is."""
 
-    done: int = Field(description="Impacts that are committed.")
+    done: int = Field(description="Impacts that are committed; of a fit, 1 once it is.")
     total: int | None = Field(description="Null until it is known.")
+
+
+class GateView(BaseModel):
+    """How a model did at one gate."""
+
+    gate: str
+    criterion: str | None
+    value: Any = Field(description="What was measured.")
+    bound: Any = Field(description="What it must keep to.")
+    passed: bool
+    detail: str
+
+
+class FitResult(BaseModel):
+    """What a fit came to."""
+
+    version: str | None = Field(description="Of the model; null where there is none.")
+    skipped: str | None = Field(description="Why a schedule had nothing to do.")
+    promoted: bool = Field(description="Whether it is active now, having passed every gate.")
+    gates: list[GateView] | None = Field(description="Of a schedule's fit.")
+
+
+class RescoreSummary(BaseModel):
+    """How many of each."""
+
+    scored: int
+    unchanged: int = Field(description="The same score was there.")
+    changed: int = Field(description="Corrected or deleted while the job ran; left alone.")
+    failed: int
+
+
+class RescoreResult(BaseModel):
+    """What a re-score came to."""
+
+    summary: RescoreSummary
 
 
 class JobView(BaseModel):
@@ -45,7 +80,9 @@ class JobView(BaseModel):
     kind: JobKind
     state: State
     progress: ProgressView
-    result: ImportResult | None = Field(description="Once the job has ended: what it came to, also where it stopped.")
+    result: ImportResult | FitResult | RescoreResult | None = Field(
+        description="Once the job has ended: what it came to, also where it stopped."
+    )
     problem: ProblemDocument | None = Field(description="Why it failed, or was cancelled.")
     created_at: datetime
     updated_at: datetime

@@ -9,7 +9,6 @@ from starlette.responses import Response
 
 from headimpact_service import deps
 from headimpact_service.answers import answer
-from headimpact_service.errors import Problem
 from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
 from headimpact_service.parameters import ListQuery
 from headimpact_service.routes.job_shapes import JobKind, JobList, JobView, State, job_document
@@ -20,9 +19,13 @@ from headimpact_service.store.jobs import Job
 
 routes = Routes("jobs")
 
-SEEN_WITH: Mapping[str, frozenset[str]] = {"import": frozenset({"impacts:read", "impacts:write"})}
+SEEN_WITH: Mapping[str, frozenset[str]] = {
+    "import": frozenset({"impacts:read", "impacts:write"}),
+    "fit": frozenset({"models:read", "models:fit"}),
+    "rescore": frozenset({"impacts:read", "impacts:write"}),
+}
 """One of these scopes is needed to see a job of a kind."""
-STOPPED_WITH: Mapping[str, str] = {"import": "impacts:write"}
+STOPPED_WITH: Mapping[str, str] = {"import": "impacts:write", "fit": "models:fit", "rescore": "impacts:write"}
 """The scope that cancels a job of a kind is the one that makes it."""
 
 
@@ -67,7 +70,7 @@ async def list_jobs(call: Call) -> Response:
     problems=("not-found", "insufficient-scope"),
 )
 async def read_job(call: Call) -> Response:
-    """`result` and `problem` are there once it has ended. To see an import a key needs a scope for impacts."""
+    """`result` and `problem` are there once it has ended. A fit is seen with a scope for models, others for impacts."""
     return answer(job_document(await _visible(call)))
 
 
@@ -87,7 +90,7 @@ async def cancel_job(call: Call) -> Response:
     found = await _visible(call)
     scope = STOPPED_WITH[found.kind]
     if scope not in call.key.scopes:
-        raise Problem("insufficient-scope", f"This operation needs a key with the scope {scope}.")
+        raise deps.scope_missing(scope)
     job = await deps.write(call.request, lambda conn: jobs.cancel(conn, call.data_set_id, found.id))
     call.request.app.state.engine.wake()
     if job.ended:
@@ -101,7 +104,7 @@ async def _visible(call: Call) -> Job:
     job = await deps.read(call.request, lambda conn: jobs.require(conn, call.data_set_id, job_id))
     if not SEEN_WITH[job.kind] & call.key.scopes:
         scopes = " or ".join(sorted(SEEN_WITH[job.kind]))
-        raise Problem("insufficient-scope", f"This operation needs a key with the scope {scopes}.")
+        raise deps.scope_missing(scopes)
     return job
 
 

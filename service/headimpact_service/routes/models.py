@@ -1,93 +1,203 @@
-"""Risk models: their curves, their operating points, and where both come from."""
+"""Risk models: the published one and those of the data set, their reports, and which of them is in service."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from datetime import datetime
+from functools import partial
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from anyio.to_thread import run_sync
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from headimpact.criteria import BY_KEY
-from headimpact.errors import UnknownModel
-from headimpact.risk import PUBLISHED_MODELS, KnownPoint, RiskModel, critical_values, load_model, probability_of
-from headimpact_service.answers import answer
-from headimpact_service.errors import not_found
-from headimpact_service.operation import Answer, Call, Routes
+from headimpact.errors import ModelDocumentError, UnknownCriterion
+from headimpact.model_document import model_from_document, model_from_text, model_to_document
+from headimpact.risk import PUBLISHED_MODELS, RiskModel
+from headimpact.risk_map import RiskMap, draw_risk_map
+from headimpact_service import deps
+from headimpact_service.answers import HTML, JSON, SVG, answer
+from headimpact_service.bodies import read_body, require_media_type
+from headimpact_service.errors import PayloadError, Problem, invalid_parameter, not_found
+from headimpact_service.ingest.impact_json import Strict, Text
+from headimpact_service.intake import registry
+from headimpact_service.intake.scoring import Terms, operating_points
+from headimpact_service.operation import Answer, BodyForm, Call, Routes
+from headimpact_service.parameters import Query
+from headimpact_service.routes.model_shapes import (
+    ModelList,
+    ModelView,
+    curve_document,
+    metrics_of,
+    point_document,
+    summary,
+)
+from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
+from headimpact_service.store import aliases, ids, models
+from headimpact_service.store.aliases import Alias, AliasName
+from headimpact_service.store.models import NewModel, StoredModel
 
 routes = Routes("models")
 
-
-class CriticalValueView(BaseModel):
-    """The value of one component that alone gives a probability of one half."""
-
-    axis: str
-    value: float | None
-    reason: str | None
+VERSION = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+Version = Annotated[str, Field(pattern=VERSION, max_length=100, examples=["laksari-2020"])]
+DOCUMENT_BYTES = 16 * 1024 * 1024
+ALIASES: tuple[AliasName, ...] = ("active", "candidate")
 
 
-class CurveView(BaseModel):
-    """The logistic curve of one criterion: p = 1/(1 + exp(b0 + b.x))."""
+class ModelDocumentBody(BaseModel):
+    """A model's document, as `headimpact refit` writes it into model.json."""
 
-    criterion: str
-    name: str
-    unit: str
-    source: str
-    b0: float
-    b: list[float]
-    significant: list[bool] = Field(description="Which coefficients the source marks as significant at p < 0.05.")
-    critical_values: list[CriticalValueView]
+    model_config = ConfigDict(extra="allow", hide_input_in_errors=True)
+
+    format: str = Field(examples=["headimpact-model/1"])
+    version: Version
 
 
-class ModelPointView(BaseModel):
-    """An operating point that the model's source gives."""
+class ReportView(BaseModel):
+    """What a fit found out; docs/recalibration.md explains every member."""
 
-    sensitivity: float
-    specificity: float | None
-    threshold: float = Field(description="The probability from which on it is exceeded, at the model's incidence.")
-    threshold_interval: list[float | None] = Field(
-        description="What the source's rounding leaves open, or the size of the cohort; null for an end that it cannot "
-        "bound."
+    model_config = ConfigDict(extra="allow")
+
+    format: str
+    cohort: dict[str, Any]
+    criteria: dict[str, Any]
+
+
+class RiskMapQuery(Query):
+    """Of which criteria, at which incidence."""
+
+    criteria: str | None = Field(None, max_length=200, description="Keys between commas; all of rotation unless given.")
+    incidence: Annotated[float | None, Field(gt=0, lt=1, description="The model's own unless given.")] = None
+
+
+class RiskMapView(BaseModel):
+    """Probabilities over half-sine pulses of angular acceleration about all three axes."""
+
+    model: str
+    incidence: float
+    durations_ms: list[float]
+    amplitudes_rad_s2: list[float]
+    probabilities: dict[str, list[list[float]]] = Field(description="By criterion, amplitudes x durations.")
+
+
+class AliasChangeView(BaseModel):
+    """What an alias meant, from when on, and why."""
+
+    version: str | None
+    revision: int
+    reason: str
+    key: str | None
+    created_at: datetime | None
+    superseded_at: datetime | None
+
+
+class AliasView(AliasChangeView):
+    """What an alias means; `version` is null where it means none."""
+
+    name: Literal["active", "candidate"]
+    history: list[AliasChangeView] = Field(description="Oldest first; what it means now is the last.")
+
+
+class AliasBody(Strict):
+    """What an alias is to mean, and why."""
+
+    version: Version | None = Field(
+        description="A version that `GET /v1/models` lists; null lets `candidate` mean none."
     )
-    linear_predictor: float
-    linear_predictor_interval: list[float | None]
-    axis_intercepts: list[float]
-    printed: str
+    reason: Annotated[Text, AfterValidator(str.strip)] = Field(
+        description="For whoever asks later.", examples=["Gates passed; reviewed by the data team."]
+    )
 
 
-class ModelView(BaseModel):
-    """A version of the risk model."""
-
-    version: str
-    title: str
-    source: str
-    population: str
-    incidence: float
-    probability: str
-    curves: list[CurveView]
-    operating_points: dict[str, list[ModelPointView]]
-
-
-class ModelSummary(BaseModel):
-    """A model in the list."""
-
-    version: str
-    title: str
-    source: str
-    population: str
-    incidence: float
-
-
-class ModelList(BaseModel):
-    """Every model that the caller can use."""
-
-    data: list[ModelSummary]
-    next_cursor: None
+ETAG = {"ETag": "The revision, for If-Match."}
 
 
 @routes("GET", "/v1/models", "List risk models", "models:read", {200: Answer(ModelList, "All models, on one page.")})
-async def list_models(call: Call) -> Response:  # noqa: ARG001 - the shape of a handler
-    """The published ones."""
-    return answer({"data": [_summary(model) for model in PUBLISHED_MODELS.values()], "next_cursor": None})
+async def list_models(call: Call) -> Response:
+    """Those of the data set, newest first, and the published one."""
+    found, meant = await deps.read(
+        call.request, lambda conn: (models.list_all(conn, call.data_set_id), _meant(conn, call.data_set_id))
+    )
+    own = [summary(model_from_document(stored.document), stored, meant) for stored in found]
+    return answer(
+        {"data": own + [summary(model, None, meant) for model in PUBLISHED_MODELS.values()], "next_cursor": None}
+    )
+
+
+@routes(
+    "POST",
+    "/v1/models",
+    "Register a model",
+    "models:fit",
+    {201: Answer(ModelView, "The model."), 200: Answer(ModelView, "The same model was registered before.")},
+    body_forms=(BodyForm(JSON, ModelDocumentBody),),
+    problems=("conflict", "invalid-payload", "body-too-large", "unsupported-media-type"),
+)
+async def register_model(call: Call) -> Response:
+    """The model.json of `headimpact refit`. A version never changes: another document under its name is 409."""
+    require_media_type(call.request, (JSON,))
+    text = await read_body(call.request, DOCUMENT_BYTES)
+    try:
+        model = await run_sync(model_from_text, text)
+    except ModelDocumentError as error:
+        fault = PayloadError(error.detail, "model-document", pointer=error.pointer)
+        raise Problem("invalid-payload", "The document is no risk model.", errors=[fault]) from None
+    registry.require_free(model.version)
+    new = NewModel(version=model.version, document=model_to_document(model), key_id=call.key.id)
+    stored, made = await deps.write(call.request, lambda conn: models.add(conn, call.data_set_id, new))
+    meant = await deps.read(call.request, lambda conn: _meant(conn, call.data_set_id))
+    return answer(_document(model, stored, meant, None), 201 if made else 200)
+
+
+@routes(
+    "GET",
+    "/v1/models/aliases/{alias}",
+    "Read an alias",
+    "models:read",
+    {200: Answer(AliasView, "What it means now, and meant before.", headers=ETAG)},
+    problems=("not-found",),
+)
+async def read_alias(call: Call) -> Response:
+    """`active` scores new impacts: the published one, until somebody chooses. `candidate` is what a fit made last."""
+    name = _alias(call)
+    history = await deps.read(call.request, lambda conn: aliases.history(conn, call.data_set_id, name))
+    return _alias_answer(name, history)
+
+
+@routes(
+    "PUT",
+    "/v1/models/aliases/{alias}",
+    "Change an alias",
+    "models:promote",
+    {200: Answer(AliasView, "What it means now.", headers=ETAG)},
+    body=AliasBody,
+    example={"version": "laksari-2020", "reason": "Back to the published model."},
+    request_headers=IF_MATCH,
+    problems=("not-found", "conflict", "operating-point-unreachable", "precondition-failed", "precondition-required"),
+)
+async def change_alias(call: Call) -> Response:
+    """Promotion and rollback are the same call. New scores follow at once, in other processes within five seconds.
+
+    Stored scores keep the model that made them. A model that lacks an operating point which the organisation has set
+    is not promoted: alerts would be missing in silence.
+    """
+    name, revision = _alias(call), if_match(call.request, required=True)
+    body: AliasBody = call.body
+    if name == "active" and body.version is None:
+        raise Problem("conflict", "Some model is always active: name one, as the published laksari-2020.")
+
+    def change(conn: Any) -> list[Alias]:  # noqa: ANN401 - a connection of the store
+        if body.version is not None:
+            model = registry.model_of(conn, call.data_set_id, body.version)
+            if name == "active" and call.key.operating_points:
+                operating_points(call.terms.operating_points, Terms(incidence=call.terms.incidence, model=model))
+        aliases.put(conn, call.data_set_id, name, body.version, body.reason, call.key.id, if_match=revision)
+        return aliases.history(conn, call.data_set_id, name)
+
+    history = await deps.write(call.request, change)
+    call.request.app.state.gate.forget()
+    return _alias_answer(name, history)
 
 
 @routes(
@@ -100,55 +210,126 @@ async def list_models(call: Call) -> Response:  # noqa: ARG001 - the shape of a 
 )
 async def read_model(call: Call) -> Response:
     """Coefficients, operating points with their intervals, and the source of both."""
+    version, data_set_id = call.path("version"), call.data_set_id
+
+    def find(conn: Any) -> dict[str, Any]:  # noqa: ANN401 - a connection of the store
+        model = registry.model_of(conn, data_set_id, version)
+        stored = models.get(conn, data_set_id, version)
+        return _document(model, stored, _meant(conn, data_set_id), models.report(conn, data_set_id, version))
+
+    return answer(await deps.read(call.request, find))
+
+
+@routes(
+    "GET",
+    "/v1/models/{version}/report",
+    "Read the report of a fit",
+    "models:read",
+    {200: Answer(ReportView, "What the fit found out.", (JSON, HTML))},
+    problems=("not-found", "not-acceptable"),
+)
+async def read_report(call: Call) -> Response:
+    """As JSON, or as a page for people. 404 for a model that was not fitted here."""
+    version = call.path("version")
+    if call.media_type == HTML:
+        page = await deps.read(call.request, lambda conn: models.page(conn, call.data_set_id, version))
+        if page is None:
+            raise not_found("report")
+        return Response(page, media_type=HTML)
+    report = await deps.read(call.request, lambda conn: models.report(conn, call.data_set_id, version))
+    if report is None:
+        raise not_found("report")
+    return answer(report)
+
+
+@routes(
+    "GET",
+    "/v1/models/{version}/risk-map",
+    "Draw a model's risk map",
+    "models:read",
+    {200: Answer(RiskMapView, "The risk over half-sine pulses.", (JSON, SVG))},
+    query=RiskMapQuery,
+    problems=("not-found", "not-acceptable"),
+)
+async def read_risk_map(call: Call) -> Response:
+    """Figure 8 of Laksari et al. 2020, for any model: as numbers, or as a picture."""
+    query: RiskMapQuery = call.query
+    model = await deps.read(call.request, lambda conn: registry.model_of(conn, call.data_set_id, call.path("version")))
+    chosen = None if query.criteria is None else [key.strip() for key in query.criteria.split(",")]
     try:
-        model = load_model(call.path("version"))
-    except UnknownModel:
-        raise not_found("model") from None
-    return answer(document(model))
+        drawn = await run_sync(partial(draw_risk_map, model, chosen, incidence=query.incidence))
+    except UnknownCriterion as error:
+        raise invalid_parameter("criteria", str(error), "not-allowed") from None
+    if call.media_type == SVG:
+        if not drawn.probabilities:
+            raise Problem("not-found", "The model has no curve of a criterion of rotation alone.")
+        return Response(await run_sync(partial(_picture, drawn)), media_type=SVG)
+    return answer(_risk_map(drawn))
 
 
-def _summary(model: RiskModel) -> dict[str, Any]:
-    names = ("version", "title", "source", "population", "incidence")
-    return {name: getattr(model, name) for name in names}
+def _picture(drawn: RiskMap) -> str:
+    # Here, since a service that nobody asks for a picture does without its tens of megabytes.
+    from headimpact_service.reports.figures import risk_map_svg
+
+    return risk_map_svg(drawn)
 
 
-def document(model: RiskModel) -> dict[str, Any]:
+def _risk_map(drawn: RiskMap) -> dict[str, Any]:
+    return {
+        "model": drawn.model,
+        "incidence": drawn.incidence,
+        "durations_ms": [duration * 1000.0 for duration in drawn.durations_s],
+        "amplitudes_rad_s2": list(drawn.amplitudes_rad_s2),
+        "probabilities": {key: found.tolist() for key, found in drawn.probabilities.items()},
+    }
+
+
+def _alias(call: Call) -> AliasName:
+    name = call.path("alias")
+    for alias in ALIASES:
+        if alias == name:
+            return alias
+    raise not_found("alias")
+
+
+def _meant(conn: Any, data_set_id: bytes) -> dict[str, str | None]:  # noqa: ANN401 - a connection of the store
+    """The version of each alias."""
+    meant: dict[str, str | None] = {alias: aliases.get(conn, data_set_id, alias).version for alias in ALIASES}
+    return meant | {"active": meant["active"] or registry.DEFAULT.version}
+
+
+def _alias_answer(name: AliasName, history: list[Alias]) -> Response:
+    first = registry.DEFAULT.version if name == "active" else None
+    unsaid = Alias(name=name, version=first, revision=0, reason="", key_id=None, created_at=None)
+    now = history[-1] if history else unsaid
+    document = {"name": name, **_change(now), "history": [_change(one) for one in history or [unsaid]]}
+    return answer(document, headers=etag(now.revision))
+
+
+def _change(alias: Alias) -> dict[str, Any]:
+    return {
+        "version": alias.version,
+        "revision": alias.revision,
+        "reason": alias.reason,
+        "key": None if alias.key_id is None else ids.encode("key", alias.key_id),
+        "created_at": alias.created_at,
+        "superseded_at": alias.superseded_at,
+    }
+
+
+def _document(
+    model: RiskModel, stored: StoredModel | None, meant: Mapping[str, str | None], report: Mapping[str, Any] | None
+) -> dict[str, Any]:
     """A model as it is answered."""
     return {
-        **_summary(model),
+        **summary(model, stored, meant),
         "probability": "p = 1/(1 + exp(b0 + b.x))",
-        "curves": [_curve(model, key) for key in model.curves],
+        "cohort": dict(model.cohort),
+        "curves": [curve_document(model, key) for key in model.curves],
         "operating_points": {
-            key: [_point(point) for point in points] for key, points in model.operating_points.items()
+            key: [point_document(point) for point in points] for key, points in model.operating_points.items()
         },
-    }
-
-
-def _curve(model: RiskModel, key: str) -> dict[str, Any]:
-    curve, criterion = model.curves[key], BY_KEY[key]
-    return {
-        "criterion": key,
-        "name": criterion.name,
-        "unit": criterion.unit,
-        "source": criterion.source,
-        "b0": curve.b0,
-        "b": list(curve.b),
-        "significant": list(curve.significant),
-        "critical_values": [
-            {"axis": found.axis, "value": found.value, "reason": found.reason} for found in critical_values(model, key)
-        ],
-    }
-
-
-def _point(point: KnownPoint) -> dict[str, Any]:
-    low, high = point.linear_predictor_interval
-    return {
-        "sensitivity": point.sensitivity,
-        "specificity": point.specificity,
-        "threshold": probability_of(point.linear_predictor),
-        "threshold_interval": [None if end is None else probability_of(end) for end in (high, low)],
-        "linear_predictor": point.linear_predictor,
-        "linear_predictor_interval": [low, high],
-        "axis_intercepts": list(point.axis_intercepts),
-        "printed": point.printed,
+        "metrics": metrics_of(report),
+        "schedule": None if stored is None else stored.schedule,
+        "job": None if stored is None or stored.job_id is None else ids.encode("job", stored.job_id),
     }

@@ -9,7 +9,7 @@ from starlette.requests import Request
 from headimpact_service.errors import Problem, invalid_parameter
 
 IF_MATCH = {"If-Match": 'The ETag of the revision that is changed, `"1"`; `*` for whichever it is.'}
-_REVISION = re.compile(r'"([1-9]\d{0,8})"', re.ASCII)
+_REVISION = re.compile(r'"(0|[1-9]\d{0,8})"', re.ASCII)
 _ETAG = re.compile(r'(W/)?"[^"]*"')
 
 

@@ -60,6 +60,9 @@ class CriterionView(Shape):
     value: AxesView | float | None
     unit: str
     probability: Probability | None
+    probability_interval: Annotated[list[Probability], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="95 %, by the coefficients' covariance; absent of the published model, which gives none."
+    )
     window_ms: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     reason: str | None = None
 
@@ -82,7 +85,7 @@ class OperatingPointView(Shape):
     criterion: str
     requested: dict[str, float]
     threshold: float
-    threshold_interval: Annotated[list[float], Field(min_length=2, max_length=2)] | None
+    threshold_interval: Annotated[list[float | None], Field(min_length=2, max_length=2)] | None
     exceeded: bool | None
     sensitivity: float | None
     specificity: float | None

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS, LAKSARI_2020
+from headimpact.risk import DEFAULT_OPERATING_POINTS, RiskModel
 from headimpact_service import deps
 from headimpact_service.answers import answer
 from headimpact_service.errors import Problem
@@ -40,7 +40,7 @@ class SettingsView(BaseModel):
 
 
 class SettingsBody(Strict):
-    """What is to change; null takes a setting back to the published model's."""
+    """What is to change; null takes a setting back to the active model's."""
 
     incidence: Fraction | None = None
     operating_points: Annotated[list[OperatingPointBody], Field(max_length=MAX_OPERATING_POINTS)] | None = None
@@ -55,7 +55,7 @@ ETAG = {"ETag": "The revision, for If-Match."}
 async def read_settings(call: Call) -> Response:
     """Live and test keys of an organisation share its settings."""
     found = await deps.read(call.request, lambda conn: organisation_settings.get(conn, call.key.organisation_id))
-    return answer(_document(found), headers=etag(found.revision))
+    return answer(_document(found, call.terms.model), headers=etag(found.revision))
 
 
 @routes(
@@ -79,7 +79,7 @@ async def change_settings(call: Call) -> Response:
     revision = if_match(call.request)
     body: SettingsBody = call.body
     named = body.model_fields_set
-    points = _points(body)
+    points = _points(body, call.terms.model)
 
     def change(conn: Any) -> OrganisationSettings:  # noqa: ANN401 - a connection of the store
         present = organisation_settings.get(conn, call.key.organisation_id)
@@ -93,20 +93,20 @@ async def change_settings(call: Call) -> Response:
 
     found = await deps.write(call.request, change)
     call.request.app.state.gate.forget()
-    return answer(_document(found), headers=etag(found.revision))
+    return answer(_document(found, call.terms.model), headers=etag(found.revision))
 
 
-def _points(body: SettingsBody) -> list[dict[str, object]]:
+def _points(body: SettingsBody, model: RiskModel) -> list[dict[str, object]]:
     """The operating points of a body as they are stored, once the model has them all."""
     requests = requests_of(body.operating_points or ())
-    operating_points(requests, Terms())
+    operating_points(requests, Terms(model=model))
     return [{"criterion": request.criterion, **request.requested} for request in requests]
 
 
-def _document(found: OrganisationSettings) -> dict[str, Any]:
+def _document(found: OrganisationSettings, model: RiskModel) -> dict[str, Any]:
     default = [{"criterion": point.criterion, **point.requested} for point in DEFAULT_OPERATING_POINTS]
     return {
-        "incidence": LAKSARI_2020.incidence if found.incidence is None else found.incidence,
+        "incidence": model.incidence if found.incidence is None else found.incidence,
         "operating_points": list(found.operating_points) or default,
         "revision": found.revision,
     }

@@ -9,13 +9,13 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from typing import Any
 
-from sqlalchemy import Connection, bindparam, insert, select, update
+from sqlalchemy import Connection, and_, bindparam, insert, select, update
 
 from headimpact_service.errors import not_found
 from headimpact_service.store import ids
 from headimpact_service.store.organisations import Mode, clean_name, ensure, ensure_data_set
 from headimpact_service.store.prepared import Prepared
-from headimpact_service.store.tables import api_keys, data_sets, organisations
+from headimpact_service.store.tables import api_keys, data_sets, model_aliases, organisations
 
 RANDOM_BYTES = 32
 """43 characters of URL-safe base64."""
@@ -40,6 +40,8 @@ class KeyRow:
     incidence: float | None
     operating_points: tuple[dict[str, object], ...]
     settings_revision: int
+    model: str | None
+    """The version of the data set's active model; None as long as nobody has chosen one."""
 
     def is_valid(self, now: datetime) -> bool:
         """Whether it is neither revoked nor expired."""
@@ -63,9 +65,18 @@ _KEY = (
         organisations.c.incidence,
         organisations.c.operating_points,
         organisations.c.settings_revision,
+        model_aliases.c.version.label("model"),
     )
     .join(data_sets, data_sets.c.id == api_keys.c.data_set_id)
     .join(organisations, organisations.c.id == data_sets.c.organisation_id)
+    .outerjoin(
+        model_aliases,
+        and_(
+            model_aliases.c.data_set_id == data_sets.c.id,
+            model_aliases.c.name == "active",
+            model_aliases.c.superseded_at.is_(None),
+        ),
+    )
 )
 _BY_DIGEST = Prepared(_KEY.where(api_keys.c.sha256 == bindparam("digest")))
 _BY_ID = _KEY.where(api_keys.c.id == bindparam("key_id"), data_sets.c.organisation_id == bindparam("organisation_id"))

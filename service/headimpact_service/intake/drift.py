@@ -1,0 +1,58 @@
+"""Whether the active model still holds on a cohort, in the order of time: for the report of a fit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.special import expit
+
+from headimpact.calibration.drift import group_shifts, risk_adjusted_cusum
+from headimpact.calibration.rare_events import prior_offset
+from headimpact.risk import RiskModel
+from headimpact_service.intake.cohorts import Selected
+from headimpact_service.store.tables import CRITERION_COLUMNS, VALUE_COLUMNS
+
+REFERENCE = "bam"
+_FIRST = VALUE_COLUMNS.index(CRITERION_COLUMNS[REFERENCE][0])
+
+
+def drift_document(selected: Selected, active: RiskModel, tau: float | None) -> dict[str, Any] | None:
+    """Observed against expected, a chart of the odds, and shifts between devices; None where nothing can be said.
+
+    In a case-control sample the level is that of the sample: the chart then looks for changes within it.
+    """
+    if REFERENCE not in active.curves:
+        return None
+    rows = [
+        (impact.values[_FIRST : _FIRST + 3], outcome, impact.device or "")
+        for impact, outcome in zip(selected.impacts, selected.outcomes, strict=True)
+        if None not in impact.values[_FIRST : _FIRST + 3]
+    ]
+    y = np.array([outcome for _, outcome, _ in rows])
+    if not rows or not 0 < y.sum() < y.size:
+        return None
+    curve = active.curves[REFERENCE]
+    x = np.array([values for values, _, _ in rows], dtype=np.float64)
+    eta = -(curve.b0 + active.incidence_shift(tau) + x @ np.array(curve.b))
+    if tau is not None:
+        eta = eta + prior_offset(float(y.mean()), tau)
+    p = expit(eta)
+    chart = risk_adjusted_cusum(y, p)
+    shifts = group_shifts(eta, [device.strip() or "unknown" for _, _, device in rows])
+    return {
+        "model": active.version,
+        "criterion": REFERENCE,
+        "observed": float(y.sum()),
+        "expected": float(p.sum()),
+        "cusum": {
+            "odds_ratio": chart.odds_ratio,
+            "limit": chart.limit,
+            "largest": float(chart.values.max()),
+            "last": float(chart.values[-1]),
+            "signals_after": None if chart.first_signal is None else chart.first_signal + 1,
+        },
+        "devices": [
+            {"device": one.group, "n": one.n, "mean": one.mean, "difference": one.difference} for one in shifts
+        ],
+    }

@@ -1,0 +1,104 @@
+"""What a fit is asked for, by a request or by a schedule."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from headimpact.criteria import CRITERION_KEYS
+from headimpact_service.ingest.impact_json import CriterionKey, Fraction, Moment, Strict, Text, Word
+
+MAX_REPLICAS = 10_000
+
+
+class CohortBody(Strict):
+    """Which labelled impacts enter; all unless it says so."""
+
+    occurred_from: Moment | None = Field(default=None, description="At this time or later.")
+    occurred_to: Moment | None = Field(default=None, description="Before this time.")
+    sport: Text | None = None
+    activity: Text | None = None
+    session_id: Text | None = None
+    device_serial: Text | None = None
+    athlete_level: Word | None = None
+    athlete_sex: Literal["male", "female", "other"] | None = None
+    include: Annotated[list[Literal["unverified", "false_positive", "not_worn"]], Field(max_length=3)] = Field(
+        default=[], description="Kinds of impacts that stay out otherwise."
+    )
+
+
+def _known(name: str) -> str:
+    keys = name.split("+")
+    if any(key not in CRITERION_KEYS for key in keys) or len(set(keys)) < len(keys):
+        raise ValueError("A criterion is one of the thirteen keys; a plus sign joins some that are fitted together.")
+    return name
+
+
+class FitBody(Strict):
+    """A fit: on whom, of what, and how."""
+
+    cohort: CohortBody = Field(default_factory=CohortBody)
+    criteria: Annotated[list[Annotated[Word, AfterValidator(_known)]], Field(max_length=40)] | None = Field(
+        default=None, description="All thirteen unless given."
+    )
+    sampling: Literal["case_control", "full_follow_up"] = Field(
+        default="case_control",
+        description="`case_control` where impacts were chosen by their outcome: intercepts go to `incidence`.",
+    )
+    incidence: Fraction | None = Field(default=None, description="The active settings' unless given.")
+    incidence_range: Annotated[list[Fraction], Field(min_length=2, max_length=2)] | None = None
+    bias_correction: Literal["king_zeng", "firth", "zelig", "none"] = "king_zeng"
+    replicas: Annotated[int, Field(ge=0, le=MAX_REPLICAS)] = 1000
+    folds: Annotated[int, Field(ge=2, le=100)] = 5
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    sensitivity_targets: Annotated[list[Annotated[float, Field(gt=0, le=1)]], Field(min_length=1, max_length=20)] = (
+        Field(default=[0.5, 0.9])
+    )
+    title: Text | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> FitBody:
+        if self.incidence_range is not None and self.incidence_range[0] > self.incidence_range[1]:
+            raise ValueError("A range of incidences rises.")
+        if self.criteria is not None and len(set(self.criteria)) < len(self.criteria):
+            raise ValueError("Each criterion may be named once.")
+        return self
+
+
+class GatesBody(Strict):
+    """What a model must pass before it is promoted by itself; what is left out keeps its default."""
+
+    criteria: Annotated[list[CriterionKey], Field(min_length=1, max_length=13)] = Field(default=["bam"])
+    min_events: Annotated[int, Field(ge=1)] = 30
+    min_athletes_with_events: Annotated[int, Field(ge=1)] = 15
+    max_condition_number: Annotated[float, Field(gt=1)] = 1e8
+    max_auc_loss: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.02, description="Out of fold against the active model, by the lower end of a bootstrap of athletes."
+    )
+    expected_over_observed: Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=2, max_length=2)] = Field(
+        default=[0.8, 1.25],
+        description="What the 95 % interval of E:O must meet, out of fold and weighted to the incidence.",
+    )
+    calibration_slope: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
+        default=[0.8, 1.2], description="Out of fold."
+    )
+    waive_lowering: Annotated[list[Word], Field(max_length=39)] = Field(
+        default=[],
+        description="Coefficients that may lower the risk: `bam.y`, or `bam` for all of its.",
+        examples=[["bam.y"]],
+    )
+    max_panel_change: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=0.15, description="Of any probability over the cohort's range, against the active model."
+    )
+    sensitivity: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=0.9, description="At whose threshold no fewer concussions may be alarmed than by the active model."
+    )
+
+
+def stored(body: FitBody, incidence: float) -> dict[str, Any]:
+    """A fit as jobs and schedules keep it: JSON, complete, with the incidence that holds now."""
+    document = body.model_dump(mode="json", exclude_none=True)
+    if body.sampling == "case_control":
+        document.setdefault("incidence", incidence)
+    return document

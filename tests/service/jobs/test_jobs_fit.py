@@ -1,0 +1,454 @@
+"""Fits as jobs: a version from labels, the same as from the export; what allows none; gates, schedules, re-scores."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cohorts import fill
+from sending import Api, impact_body
+
+from headimpact.calibration import RefitOptions, fitted_model, make_cohort, refit
+from headimpact.model_document import model_to_document
+from headimpact_service.cli import refit as refit_command
+from headimpact_service.deps import SCOPES
+from headimpact_service.intake.cron import next_due
+from headimpact_service.jobs import runs
+from headimpact_service.jobs.engine import KINDS
+from headimpact_service.jobs.fit import Fit, _register
+from headimpact_service.jobs.runs import House
+from headimpact_service.store import ids, job_runs, jobs, keys, labels, schedules
+from headimpact_service.store.database import Database
+from headimpact_service.store.labels import NewLabel
+
+QUICK = {"criteria": ["bam", "bric"], "replicas": 20, "seed": 1, "version": "spring"}
+
+
+@pytest.fixture
+def mine(api: Api, database: Database) -> bytes:
+    """The data set that the client's key sees."""
+    with database.read() as conn:
+        found = keys.find_key(conn, api.key or "")
+    assert found is not None
+    return found.data_set_id
+
+
+@pytest.fixture
+def do(house: House, api: Api) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    """Does a job that was ordered, here, and reads it."""
+
+    def do(job: dict[str, Any]) -> dict[str, Any]:
+        job_id = ids.decode("job", job["id"])
+        assert job_id is not None
+        runs.run(house, KINDS, job_id, 1)
+        return dict(api.get(f"/v1/jobs/{job['id']}").json())
+
+    return do
+
+
+Do = Callable[[dict[str, Any]], dict[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def spring() -> dict[str, Any]:
+    """The document of a model that was fitted elsewhere."""
+    generator = np.random.default_rng(4)
+    bam = generator.gamma(1.5, 0.04, (300, 3))
+    hurt = (generator.random(300) < 1 / (1 + np.exp(5 - bam @ np.array([18.0, 12.0, 20.0])))).astype(float)
+    cohort = make_cohort(hurt, [f"a{i % 30}" for i in range(300)], {"bam": bam, "bric": bam.sum(axis=1, keepdims=True)})
+    return model_to_document(fitted_model(refit(cohort, RefitOptions(replicas=0)), "spring"))
+
+
+def register(api: Api, document: dict[str, Any]) -> None:
+    assert api.post("/v1/models", json=document).status_code == 201
+
+
+def order(api: Api, **fields: Any) -> dict[str, Any]:
+    answer = api.post("/v1/models/fits", json=QUICK | fields)
+    assert answer.status_code == 202, answer.text
+    return dict(answer.json())
+
+
+class TestFit:
+    def test_a_fit_becomes_a_version_with_report_page_and_alias(
+        self, api: Api, database: Database, mine: bytes, do: Do
+    ) -> None:
+        fill(database, mine)
+        done = do(order(api))
+        assert done["state"] == "succeeded", done
+        assert done["result"] == {"version": "spring", "skipped": None, "promoted": False, "gates": None}
+        model = api.get("/v1/models/spring").json()
+        assert model["basis"] == "cohort"
+        assert model["aliases"] == ["candidate"]
+        assert model["job"] == done["id"]
+        assert model["cohort"]["n"] == 120
+        assert model["metrics"]["bam"]["auc"] > 0.5
+        assert len(model["curves"][1]["intervals"]) == 4
+        report = api.get("/v1/models/spring/report").json()
+        assert report["cohort"]["digest"] == model["cohort"]["digest"]
+        page = api.get("/v1/models/spring/report", headers={"accept": "text/html"})
+        assert page.headers["content-type"].startswith("text/html")
+        assert "Model card" in page.text
+        assert api.get("/v1/models/aliases/candidate").json()["version"] == "spring"
+        assert api.get("/v1/models/aliases/active").json()["version"] == "laksari-2020"
+
+    def test_the_export_fed_to_the_command_line_gives_the_same_model(
+        self, api: Api, database: Database, mine: bytes, do: Do, tmp_path: Path
+    ) -> None:
+        fill(database, mine)
+        api.create("unlabelled")
+        do(order(api))
+        for form, name in (("text/csv", "t.csv"), ("application/vnd.apache.parquet", "t.parquet")):
+            (tmp_path / name).write_bytes(api.get("/v1/impacts", headers={"accept": form}).content)
+            options = {"criteria": ("bam", "bric"), "replicas": 20, "seed": 1}
+            request = refit_command.Request(options, frozenset(), None, None, "laksari-2020", "spring")
+            refit_command.run(tmp_path / name, tmp_path / "out", request)
+            ours = api.get("/v1/models/spring/report").json()
+            theirs = json.loads((tmp_path / "out" / "report.json").read_text())
+            for member in ("drift", "gates", "table"):
+                ours.pop(member, None), theirs.pop(member, None)
+            assert theirs == ours
+
+    def test_unlabelled_withdrawn_and_unverified_impacts_stay_out(
+        self, api: Api, database: Database, mine: bytes, do: Do
+    ) -> None:
+        made = fill(database, mine)
+        first = ids.encode("imp", made[0])
+        athlete = api.get(f"/v1/impacts/{first}").json()["athlete"]["id"]
+        api.patch(f"/v1/athletes/{athlete}", json={"consent": "withdrawn"})
+        unsure = {"outcome": "no_concussion", "basis": "video_review", "event": "unverified"}
+        api.put(f"/v1/impacts/{ids.encode('imp', made[1])}/label", json=unsure)
+        api.create("unlabelled")
+        do(order(api))
+        table = api.get("/v1/models/spring/report").json()["table"]
+        assert table["excluded"] == {"consent_withdrawn": 5, "no_outcome": 1, "unverified": 1}
+        do(order(api, version="all", cohort={"include": ["unverified"], "sport": "rugby"}))
+        assert api.get("/v1/models/all").json()["cohort"]["n"] == 115
+
+    @pytest.mark.parametrize(
+        ("cohort", "told"), [({"sport": "chess"}, "has no impacts"), ({"occurred_from": "2030-01-01T00:00:00Z"}, "no")]
+    )
+    def test_a_cohort_that_allows_no_fit_fails_and_says_what_is_missing(
+        self, api: Api, database: Database, mine: bytes, do: Do, cohort: dict[str, Any], told: str
+    ) -> None:
+        fill(database, mine, 20)
+        done = do(order(api, cohort=cohort))
+        assert done["state"] == "failed"
+        assert done["problem"]["type"] == "/problems/cohort-unfit"
+        assert told in done["problem"]["detail"]
+        assert api.get("/v1/models/spring").status_code == 404
+
+    def test_no_events_fail_and_say_so(self, api: Api, database: Database, mine: bytes, do: Do) -> None:
+        impact = api.create("e-1")["id"]
+        api.put(f"/v1/impacts/{impact}/label", json={"outcome": "no_concussion", "basis": "follow_up"})
+        done = do(order(api))
+        assert "none with a concussion" in done["problem"]["detail"]
+
+    def test_an_impact_that_leaves_the_cohort_while_it_is_fitted_fails_the_job(
+        self, api: Api, database: Database, mine: bytes, house: House, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made = fill(database, mine)
+        ordered = order(api)
+
+        def late(self: Fit, work: Any) -> None:
+            with work.computing("headimpact_service.jobs.fit_compute:compute", self._arguments(work)) as values:
+                for value in values:
+                    api.delete(f"/v1/impacts/{ids.encode('imp', made[0])}/label")
+                    work.commit(0, 1, lambda conn, value=value: _register(work.job, value, conn))
+
+        monkeypatch.setattr(Fit, "run", late)
+        runs.run(house, KINDS, ids.decode("job", ordered["id"]) or b"", 1)
+        done = api.get(f"/v1/jobs/{ordered['id']}").json()
+        assert done["problem"]["type"] == "/problems/cohort-changed"
+        assert "an impact was" in done["problem"]["detail"]
+        assert api.get("/v1/models/spring").status_code == 404
+
+    def test_one_idempotency_key_makes_one_job(self, api: Api) -> None:
+        headers = {"idempotency-key": "monday"}
+        first, again = (api.post("/v1/models/fits", json=QUICK, headers=headers).json() for _ in range(2))
+        assert first["id"] == again["id"]
+        other = api.post("/v1/models/fits", json=QUICK | {"seed": 2}, headers=headers)
+        assert other.json()["type"] == "/problems/idempotency-conflict"
+
+    @pytest.mark.parametrize(
+        ("fields", "pointer"),
+        [
+            ({"criteria": ["nonsense"]}, "/criteria/0"),
+            ({"criteria": ["bam", "bam"]}, ""),
+            ({"incidence": 0}, "/incidence"),
+            ({"incidence_range": [0.5, 0.1]}, ""),
+            ({"replicas": 10001}, "/replicas"),
+            ({"folds": 1}, "/folds"),
+            ({"seed": -1}, "/seed"),
+            ({"version": "a b"}, "/version"),
+            ({"cohort": {"occurred_from": "yesterday"}}, "/cohort/occurred_from"),
+            ({"cohort": {"mood": "x"}}, "/cohort/mood"),
+        ],
+    )
+    def test_a_fit_that_cannot_be_is_refused(self, api: Api, fields: dict[str, Any], pointer: str) -> None:
+        answer = api.post("/v1/models/fits", json=QUICK | fields)
+        assert answer.status_code == 422
+        assert answer.json()["errors"][0].get("pointer", "") == pointer
+
+    @pytest.mark.parametrize("version", ["laksari-2020", "fits", "aliases"])
+    def test_a_name_that_is_taken_for_good_is_refused(self, api: Api, version: str) -> None:
+        assert api.post("/v1/models/fits", json=QUICK | {"version": version}).status_code == 409
+
+
+class TestService:
+    """The fitted model in service."""
+
+    def promote(self, api: Api, version: str, revision: int) -> Any:
+        body = {"version": version, "reason": "Reviewed."}
+        headers = {"if-match": f'"{revision}"'}
+        return api.put("/v1/models/aliases/active", json=body, headers=headers)
+
+    def test_new_impacts_are_scored_by_the_active_model_and_old_ones_keep_theirs(
+        self, api: Api, spring: dict[str, Any]
+    ) -> None:
+        register(api, spring)
+        before = api.create("before", 2.0)
+        assert self.promote(api, "spring", 0).status_code == 200
+        after = api.create("after", 2.0)
+        assert before["score"]["model"] == "laksari-2020"
+        assert after["score"]["model"] == "spring"
+        bam = after["score"]["criteria"]["bam"]
+        low, high = bam["probability_interval"]
+        assert low < bam["probability"] < high
+        assert bam["value"] == before["score"]["criteria"]["bam"]["value"]
+        assert after["score"]["criteria"]["hic15"]["probability"] is None
+        assert "no curve" in after["score"]["criteria"]["hic15"]["reason"]
+        assert after["score"]["operating_points"][0]["basis"] == "cohort"
+        assert api.get(f"/v1/impacts/{before['id']}").json()["score"]["model"] == "laksari-2020"
+        assert api.get(f"/v1/impacts/{after['id']}").json()["score"] == after["score"]
+        assert api.post("/v1/score", json={"kinematics": impact_body()["kinematics"]}).json()["model"] == "spring"
+        assert api.post("/v1/impacts", json=impact_body("before", 2.0)).json()["score"]["model"] == "laksari-2020"
+
+    def test_rollback_is_the_same_call_and_the_history_says_why(self, api: Api, spring: dict[str, Any]) -> None:
+        register(api, spring)
+        self.promote(api, "spring", 0)
+        back = self.promote(api, "laksari-2020", 1)
+        assert [change["version"] for change in back.json()["history"]] == ["spring", "laksari-2020"]
+        assert back.headers["etag"] == '"2"'
+        assert api.create("e")["score"]["model"] == "laksari-2020"
+        assert self.promote(api, "spring", 1).status_code == 412
+
+    def test_promotion_needs_if_match_a_reason_and_a_version_that_is_there(self, api: Api) -> None:
+        address, body = "/v1/models/aliases/active", {"version": "laksari-2020", "reason": "x"}
+        assert api.put(address, json=body).status_code == 428
+        assert self.promote(api, "nobody", 0).status_code == 404
+        assert api.put(address, json={"version": "laksari-2020"}, headers={"if-match": "*"}).status_code == 422
+        nothing = api.put(address, json={"version": None, "reason": "x"}, headers={"if-match": "*"})
+        assert nothing.status_code == 409
+        assert api.get("/v1/models/aliases/nonsense").status_code == 404
+
+    def test_a_model_without_the_organisations_operating_point_is_not_promoted(
+        self, api: Api, spring: dict[str, Any]
+    ) -> None:
+        only = {name: {"bric": spring[name]["bric"]} for name in ("curves", "operating_points")}
+        register(api, spring | only)
+        api.patch("/v1/settings", json={"operating_points": [{"criterion": "bam", "sensitivity": 0.9}]})
+        refused = self.promote(api, "spring", 0)
+        assert refused.json()["type"] == "/problems/operating-point-unreachable"
+        api.patch("/v1/settings", json={"operating_points": None})
+        assert self.promote(api, "spring", 0).status_code == 200
+        assert api.create("e")["score"]["operating_points"] == []
+
+    def test_models_belong_to_their_data_set(
+        self, api: Api, spring: dict[str, Any], make_key: Callable[..., str]
+    ) -> None:
+        register(api, spring)
+        for other in (make_key(*SCOPES, organisation="other"), make_key(*SCOPES, mode="test")):
+            assert api.get("/v1/models/spring", key=other).status_code == 404
+            assert api.get("/v1/models/spring/report", key=other).status_code == 404
+            assert api.get("/v1/models/spring/risk-map", key=other).status_code == 404
+            body = {"version": "spring", "reason": "x"}
+            request = {"json": body, "headers": {"if-match": "*"}, "key": other}
+            assert api.put("/v1/models/aliases/active", **request).status_code == 404
+
+    def test_scores_of_another_version_are_made_by_a_job_and_kept_beside(
+        self, api: Api, database: Database, mine: bytes, do: Do, spring: dict[str, Any]
+    ) -> None:
+        made = fill(database, mine)
+        register(api, spring)
+        ordered = api.post("/v1/models/spring/scores", json={}).json()
+        late = api.create("late")
+        done = do(ordered)
+        assert done["state"] == "succeeded", done
+        assert done["progress"] == {"done": 120, "total": 120}
+        assert done["result"]["summary"] == {"scored": 120, "unchanged": 0, "changed": 0, "failed": 0}
+        first = ids.encode("imp", made[0])
+        assert api.get(f"/v1/impacts/{first}").json()["score"]["model"] == "spring"
+        scores = api.get(f"/v1/impacts/{first}/scores").json()["data"]
+        assert [(score["model"], score["current"]) for score in scores] == [("laksari-2020", False), ("spring", True)]
+        assert api.get(f"/v1/impacts/{late['id']}").json()["score"]["model"] == "laksari-2020"
+        again = do(api.post("/v1/models/spring/scores", json={"cohort": {"sport": "rugby"}}).json())
+        assert again["result"]["summary"]["unchanged"] == 120
+        beside = do(api.post("/v1/models/laksari-2020/scores", json={"make_current": False}).json())
+        assert beside["result"]["summary"]["unchanged"] == 121
+        assert api.get(f"/v1/impacts/{first}").json()["score"]["model"] == "spring"
+
+    def test_a_risk_map_is_numbers_or_a_picture(self, api: Api) -> None:
+        found = api.get("/v1/models/laksari-2020/risk-map", params={"criteria": "bam,bric"}).json()
+        assert set(found["probabilities"]) == {"bam", "bric"}
+        assert len(found["probabilities"]["bam"]) == len(found["amplitudes_rad_s2"])
+        picture = api.get("/v1/models/laksari-2020/risk-map", headers={"accept": "image/svg+xml"})
+        assert picture.headers["content-type"] == "image/svg+xml"
+        assert picture.text.startswith("<svg")
+        assert api.get("/v1/models/laksari-2020/risk-map", params={"criteria": "hic15"}).status_code == 422
+        assert api.get("/v1/models/laksari-2020/report").status_code == 404
+
+
+class TestRegistration:
+    def test_the_model_of_the_command_line_is_registered_once(
+        self, api: Api, database: Database, mine: bytes, tmp_path: Path
+    ) -> None:
+        fill(database, mine)
+        (tmp_path / "t.csv").write_bytes(api.get("/v1/impacts", headers={"accept": "text/csv"}).content)
+        request = refit_command.Request({"criteria": ("bam",), "replicas": 0}, frozenset(), None, None, None, "mine-1")
+        refit_command.run(tmp_path / "t.csv", tmp_path / "out", request)
+        document = json.loads((tmp_path / "out" / "model.json").read_text())
+        assert api.post("/v1/models", json=document).status_code == 201
+        assert api.post("/v1/models", json=document).status_code == 200
+        listed = [model["version"] for model in api.get("/v1/models").json()["data"]]
+        assert listed == ["mine-1", "laksari-2020"]
+        document["title"] = "Another"
+        assert api.post("/v1/models", json=document).status_code == 409
+        document["incidence"] = 2
+        wrong = api.post("/v1/models", json=document)
+        assert wrong.json()["errors"][0]["pointer"] == "/incidence"
+        assert api.post("/v1/models", json=document | {"version": "laksari-2020", "incidence": 0.1}).status_code == 409
+
+
+WEEKLY = {"cron": "30 3 * * 1", "fit": {name: value for name, value in QUICK.items() if name != "version"}}
+
+
+class TestSchedules:
+    def fire(self, database: Database, after: timedelta = timedelta(days=8)) -> list[Any]:
+        now = datetime.now(UTC) + after
+        return database.write(lambda conn: schedules.fire(conn, now, next_due))
+
+    def test_a_schedule_is_made_read_replaced_and_deleted(self, api: Api) -> None:
+        made = api.put("/v1/schedules/weekly", json=WEEKLY | {"time_zone": "Europe/Dublin"})
+        assert (made.status_code, made.headers["etag"]) == (201, '"1"')
+        assert made.json()["gates"]["min_events"] == 30
+        assert made.json()["fit"]["incidence"] == 0.0055
+        due = datetime.fromisoformat(made.json()["next_due"])
+        assert due.weekday() == 0
+        assert api.get("/v1/schedules/weekly").json() == made.json()
+        assert api.put("/v1/schedules/weekly", json=WEEKLY | {"time_zone": "Europe/Dublin"}).status_code == 200
+        off = api.put("/v1/schedules/weekly", json=WEEKLY | {"enabled": False}, headers={"if-match": '"1"'})
+        assert off.json()["next_due"] is None
+        assert [one["name"] for one in api.get("/v1/schedules").json()["data"]] == ["weekly"]
+        assert api.delete("/v1/schedules/weekly").status_code == 204
+        assert api.get("/v1/schedules/weekly").status_code == 404
+        assert api.delete("/v1/schedules/weekly").status_code == 404
+
+    @pytest.mark.parametrize(
+        ("fields", "pointer"),
+        [
+            ({"cron": "every monday"}, "/cron"),
+            ({"cron": "* * * * * *"}, "/cron"),
+            ({"cron": "0 0 30 2 *"}, "/cron"),
+            ({"time_zone": "Mars/Olympus"}, "/time_zone"),
+            ({"gates": {"min_events": 0}}, "/gates/min_events"),
+            ({"fit": {"version": "x"}}, "/fit/version"),
+        ],
+    )
+    def test_a_schedule_that_cannot_be_is_refused(self, api: Api, fields: dict[str, Any], pointer: str) -> None:
+        answer = api.put("/v1/schedules/weekly", json=WEEKLY | fields)
+        assert answer.status_code == 422
+        assert answer.json()["errors"][0]["pointer"] == pointer
+
+    def test_promotion_by_itself_needs_the_scope(self, api: Api, make_key: Callable[..., str]) -> None:
+        key = make_key("models:fit")
+        assert api.put("/v1/schedules/w", json=WEEKLY | {"promote": True}, key=key).status_code == 403
+        assert api.put("/v1/schedules/w", json=WEEKLY, key=key).status_code == 201
+
+    def test_two_that_look_at_once_order_one_job(self, api: Api, database: Database) -> None:
+        api.put("/v1/schedules/weekly", json=WEEKLY)
+        ordered: list[Any] = []
+        threads = [threading.Thread(target=lambda: ordered.extend(self.fire(database))) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert len(ordered) == 1
+        assert len(api.get("/v1/jobs", params={"kind": "fit"}).json()["data"]) == 1
+
+    def test_what_was_missed_is_made_up_for_once(self, api: Api, database: Database) -> None:
+        api.put("/v1/schedules/weekly", json=WEEKLY)
+        assert len(self.fire(database, timedelta(days=100))) == 1
+        assert self.fire(database, timedelta(days=100)) == []
+        due = datetime.fromisoformat(api.get("/v1/schedules/weekly").json()["next_due"])
+        assert due > datetime.now(UTC) + timedelta(days=100)
+
+    def test_it_skips_with_the_reason_where_there_is_nothing_to_learn(
+        self, api: Api, database: Database, mine: bytes, do: Do
+    ) -> None:
+        api.put("/v1/schedules/weekly", json=WEEKLY)
+
+        def fired(days: int) -> dict[str, Any]:
+            (job,) = self.fire(database, timedelta(days=days))
+            return do({"id": ids.encode("job", job.id)})
+
+        assert "no impacts" in fired(8)["result"]["skipped"]
+        made = fill(database, mine)
+        second = fired(16)
+        version = second["result"]["version"]
+        assert version.startswith("fit-")
+        assert api.get(f"/v1/models/{version}").json()["schedule"] == "weekly"
+        assert "since the last fit" in fired(24)["result"]["skipped"]
+        new = NewLabel(outcome="concussion", basis="physician_diagnosis")
+        database.write(lambda conn: labels.put(conn, mine, made[0], new))
+        assert fired(32)["result"]["version"] not in {None, version}
+
+    def test_gates_hold_a_model_back_or_let_it_through(self, api: Api, database: Database, mine: bytes, do: Do) -> None:
+        fill(database, mine, 400, athletes=60)
+        api.put("/v1/schedules/strict", json=WEEKLY | {"promote": True, "gates": {"min_events": 10_000}})
+        (job,) = self.fire(database)
+        held = do({"id": ids.encode("job", job.id)})["result"]
+        assert held["promoted"] is False
+        failed = [gate for gate in held["gates"] if not gate["passed"]]
+        assert failed[0]["gate"] == "events"
+        assert "at least 10000 are needed" in failed[0]["detail"]
+        assert api.get("/v1/models/aliases/active").json()["version"] == "laksari-2020"
+        api.delete("/v1/schedules/strict")
+        lenient = {
+            "min_events": 5,
+            "min_athletes_with_events": 3,
+            "max_auc_loss": 1.0,
+            "expected_over_observed": [0.01, 100.0],
+            "calibration_slope": [-10.0, 10.0],
+            "waive_lowering": ["bam"],
+            "max_panel_change": 1.0,
+        }
+        api.put("/v1/schedules/lenient", json=WEEKLY | {"promote": True, "gates": lenient})
+        (job,) = self.fire(database)
+        done = do({"id": ids.encode("job", job.id)})["result"]
+        assert [gate["gate"] for gate in done["gates"] if not gate["passed"]] == []
+        assert done["promoted"] is True
+        active = api.get("/v1/models/aliases/active").json()
+        assert active["version"] == done["version"]
+        assert "Passed all gates of the schedule lenient" in active["reason"]
+
+    def test_another_organisation_sees_no_schedule(self, api: Api, make_key: Callable[..., str]) -> None:
+        api.put("/v1/schedules/weekly", json=WEEKLY)
+        other = make_key(*SCOPES, organisation="other")
+        assert api.get("/v1/schedules/weekly", key=other).status_code == 404
+        assert api.get("/v1/schedules", key=other).json()["data"] == []
+        assert api.delete("/v1/schedules/weekly", key=other).status_code == 404
+
+
+def test_a_job_of_another_version_is_not_forgotten(database: Database, mine: bytes) -> None:
+    """Every kind that can be ordered can be run."""
+    with database.read() as conn:
+        assert job_runs.unfinished(conn) == []
+    assert {"import", "fit", "rescore"} == set(KINDS)
+    assert {"succeeded", "failed", "cancelled"} == jobs.ENDED
