@@ -22,6 +22,8 @@ app = typer.Typer(
 )
 keys_app = typer.Typer(help="Make, list and revoke API keys.", no_args_is_help=True)
 app.add_typer(keys_app, name="keys")
+models_app = typer.Typer(help="Register, list and promote risk models.", no_args_is_help=True)
+app.add_typer(models_app, name="models")
 
 DatabaseUrl = Annotated[
     str | None, typer.Option(help="SQLAlchemy URL; HEADIMPACT_DATABASE_URL or sqlite:///headimpact.db unless given.")
@@ -46,6 +48,53 @@ def serve(
     from headimpact_service.cli import serve as command
 
     command.run(host=host, port=port, database_url=database_url)
+
+
+@app.command()
+def work(database_url: DatabaseUrl = None) -> None:
+    """Run jobs and schedules without serving; as many of these as wanted, beside a service or without."""
+    from headimpact_service.cli import work as command
+
+    command.run(database_url=database_url)
+
+
+@models_app.command("add")
+def add_models(
+    files: Annotated[list[Path], typer.Argument(help="Files model.json of `headimpact refit`.")],
+    organisation: Organisation = "default",
+    mode: Annotated[Mode, typer.Option(help="The data set that the models are for.")] = Mode.LIVE,
+    database_url: DatabaseUrl = None,
+) -> None:
+    """Register models; a version never changes, and nothing is scored by it until it is promoted."""
+    from headimpact_service.cli import models as command
+
+    command.add(files, organisation=organisation, mode=mode.value, database_url=database_url)
+
+
+@models_app.command("list")
+def list_models(
+    organisation: Organisation = "default",
+    mode: Annotated[Mode, typer.Option(help="The data set that the models are for.")] = Mode.LIVE,
+    database_url: DatabaseUrl = None,
+) -> None:
+    """List versions and what the aliases mean."""
+    from headimpact_service.cli import models as command
+
+    command.show(organisation=organisation, mode=mode.value, database_url=database_url)
+
+
+@models_app.command("promote")
+def promote_model(
+    version: str,
+    reason: Annotated[str, typer.Option(help="For whoever asks later.")],
+    organisation: Organisation = "default",
+    mode: Annotated[Mode, typer.Option(help="The data set that the models are for.")] = Mode.LIVE,
+    database_url: DatabaseUrl = None,
+) -> None:
+    """Let a version score new impacts. Going back is the same with the version before."""
+    from headimpact_service.cli import models as command
+
+    command.promote(version, reason=reason, organisation=organisation, mode=mode.value, database_url=database_url)
 
 
 @app.command()

@@ -13,10 +13,10 @@ from sqlalchemy import Connection
 from starlette.applications import Starlette
 from starlette.requests import Request
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
+from headimpact.risk import DEFAULT_OPERATING_POINTS
 from headimpact_service.errors import Problem
 from headimpact_service.intake import registry
-from headimpact_service.intake.scoring import Terms
+from headimpact_service.intake.scoring import Terms, requests_of
 from headimpact_service.settings import Settings
 from headimpact_service.store import ids, jobs, keys
 from headimpact_service.store.database import Database
@@ -122,7 +122,7 @@ def _unauthenticated(detail: str) -> Problem:
 
 def terms_of(conn: Connection, key: keys.KeyRow) -> Terms:
     """What the impacts of the key's data set are scored with."""
-    points = tuple(OperatingPointRequest(**point) for point in key.operating_points)  # type: ignore[arg-type]
+    points = requests_of(key.operating_points)
     model = registry.DEFAULT if key.model is None else registry.model_of(conn, key.data_set_id, key.model)
     return Terms(incidence=key.incidence, operating_points=points or DEFAULT_OPERATING_POINTS, model=model)
 

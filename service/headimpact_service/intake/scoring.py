@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -192,6 +192,11 @@ def _with_range(signal: Signal | None, full_scale: float | None, unit: str) -> S
 
 # How many of a unit make one of the criteria's.
 _PER_UNIT = {"g": 1.0, "m/s^2": 9.80665, "rad/s": 1.0, "deg/s": 57.29577951308232}
+
+
+def requests_of(stored: Iterable[Mapping[str, object]]) -> tuple[OperatingPointRequest, ...]:
+    """The operating points that an organisation has set, as its settings keep them."""
+    return tuple(OperatingPointRequest(**point) for point in stored)  # type: ignore[arg-type]
 
 
 def operating_points(asked: Sequence[OperatingPointRequest] | None, terms: Terms) -> tuple[OperatingPoint, ...]:

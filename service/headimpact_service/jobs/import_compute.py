@@ -8,13 +8,13 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest, RiskModel
+from headimpact.risk import DEFAULT_OPERATING_POINTS, RiskModel
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.upload import read_upload
 from headimpact_service.intake.importing import Ready, look_up, make_ready, score_found
 from headimpact_service.intake.registry import DEFAULT, model_of
-from headimpact_service.intake.scoring import Terms
+from headimpact_service.intake.scoring import Terms, requests_of
 from headimpact_service.store.database import Database
 
 
@@ -66,5 +66,5 @@ def _chunks(
 
 
 def _terms(sent: dict[str, Any], model: RiskModel) -> Terms:
-    points = tuple(OperatingPointRequest(**point) for point in sent["operating_points"])
+    points = requests_of(sent["operating_points"])
     return Terms(incidence=sent["incidence"], operating_points=points or DEFAULT_OPERATING_POINTS, model=model)

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS, OperatingPointRequest
+from headimpact.risk import DEFAULT_OPERATING_POINTS
 from headimpact_service.errors import Problem
 from headimpact_service.intake.cohorts import filter_of
 from headimpact_service.intake.records import rebuild_record
 from headimpact_service.intake.registry import model_of
 from headimpact_service.intake.rendering import new_score
-from headimpact_service.intake.scoring import UNKNOWN_DEVICE, Terms, score_records
+from headimpact_service.intake.scoring import UNKNOWN_DEVICE, Terms, requests_of, score_records
 from headimpact_service.store import cohorts, impacts, traces
 from headimpact_service.store.database import Database
 from headimpact_service.store.score_rows import NewScore
@@ -58,7 +58,7 @@ def _parts(database: Database, arguments: dict[str, Any]) -> Iterator[int | Resc
 
 def _terms(conn: Any, arguments: dict[str, Any]) -> Terms:  # noqa: ANN401 - a connection of the store
     sent = arguments["terms"]
-    points = tuple(OperatingPointRequest(**point) for point in sent["operating_points"])
+    points = requests_of(sent["operating_points"])
     model = model_of(conn, arguments["data_set_id"], arguments["version"])
     return Terms(incidence=sent["incidence"], operating_points=points or DEFAULT_OPERATING_POINTS, model=model)
 

@@ -257,6 +257,25 @@ class TestTables:
         assert one["out_of_fold"]["reason"]
 
 
+class TestModels:
+    def test_a_model_is_registered_listed_promoted_and_rolled_back(self, done: Path, run: Run) -> None:
+        model = str(done / "model.json")
+        assert run("models", "add", model) == (0, "season-1: registered\n", "")
+        assert run("models", "add", model)[1] == "season-1: was registered already\n"
+        assert run("models", "list")[1] == "season-1\nlaksari-2020  active\n"
+        _, printed, _ = run("models", "promote", "season-1", "--reason", "Reviewed.")
+        assert printed == "season-1 is active; before it was laksari-2020.\n"
+        assert run("models", "list")[1] == "season-1  active\nlaksari-2020\n"
+        assert run("models", "promote", "laksari-2020", "--reason", "Back.")[0] == 0
+
+    def test_what_is_no_model_or_not_there_is_told(self, tmp_path: Path, run: Run) -> None:
+        (tmp_path / "m.json").write_text("{}")
+        code, _, error = run("models", "add", "m.json")
+        assert (code, "required" in error) == (2, True)
+        code, _, error = run("models", "promote", "nobody", "--reason", "x")
+        assert (code, error) == (2, "headimpact: There is no such model.\n")
+
+
 class TestFiles:
     @pytest.mark.parametrize(
         ("name", "content", "told"),
