@@ -24,7 +24,9 @@ class Fit:
         if work.outcomes:
             return
         work.expect(1)
-        with work.computing("headimpact_service.jobs.fit_compute:compute", self._arguments(work)) as values:
+        with work.computing(
+            "headimpact_service.jobs.fit_compute:compute", self._arguments(work), strange=False
+        ) as values:
             for value in values:
                 # What a fit came to is known by its members: its class would load all of statistics here.
                 store = _register if hasattr(value, "document") else _skip

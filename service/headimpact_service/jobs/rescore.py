@@ -22,7 +22,9 @@ class Rescore:
 
     def run(self, work: Work) -> None:
         """Go on behind the parts that are committed."""
-        with work.computing("headimpact_service.jobs.rescore_compute:compute", self._arguments(work)) as values:
+        with work.computing(
+            "headimpact_service.jobs.rescore_compute:compute", self._arguments(work), strange=False
+        ) as values:
             for value in values:
                 if isinstance(value, int):
                     work.expect(value)

@@ -121,9 +121,16 @@ class Work:
             raise SupersededError
         self.outcomes.extend(outcomes[-1:])
 
-    def computing(self, task: str, arguments: Mapping[str, Any]) -> AbstractContextManager[Iterator[Any]]:
-        """What `task` yields in a child process. Until that has started, the job is not to blame for an end."""
-        return computing(task, arguments, memory=self.house.memory, check=self.check, begins=self.risk)
+    def computing(
+        self, task: str, arguments: Mapping[str, Any], *, strange: bool = True
+    ) -> AbstractContextManager[Iterator[Any]]:
+        """What `task` yields in a child process. Until that has started, the job is not to blame for an end.
+
+        A job that reads nothing `strange`, only what is stored, is to blame for the end of its child alone: however
+        often this process is killed, it goes on.
+        """
+        begins = self.risk if strange else _nothing
+        return computing(task, arguments, memory=self.house.memory, check=self.check, begins=begins)
 
     def check(self) -> None:
         """Raise if this run is to stop."""
@@ -138,6 +145,10 @@ class Work:
             raise SupersededError
         if now.state == "cancelling":
             raise CancelledError
+
+
+def _nothing() -> None:
+    """Do nothing."""
 
 
 def run(house: House, kinds: Mapping[str, Kind], job_id: bytes, number: int) -> None:

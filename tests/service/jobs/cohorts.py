@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from sending import impact_body
 
+from headimpact.calibration import RefitOptions, fitted_model, make_cohort, refit
+from headimpact.model_document import model_to_document
 from headimpact_service.ingest.digest import content_digest
 from headimpact_service.ingest.impact_json import ImpactBody
 from headimpact_service.ingest.impact_reading import to_record
@@ -52,3 +54,12 @@ def _body(number: int, scale: np.ndarray, athletes: int) -> dict[str, Any]:
         for axis, factor in zip("xyz", scale, strict=True):
             signal[axis] = [value * factor for value in signal[axis]]
     return body
+
+
+def spring_document() -> dict[str, Any]:
+    """The document of a model that was fitted elsewhere."""
+    generator = np.random.default_rng(4)
+    bam = generator.gamma(1.5, 0.04, (300, 3))
+    hurt = (generator.random(300) < 1 / (1 + np.exp(5 - bam @ np.array([18.0, 12.0, 20.0])))).astype(float)
+    cohort = make_cohort(hurt, [f"a{i % 30}" for i in range(300)], {"bam": bam, "bric": bam.sum(axis=1, keepdims=True)})
+    return model_to_document(fitted_model(refit(cohort, RefitOptions(replicas=0)), "spring"))

@@ -9,13 +9,10 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from cohorts import fill
+from cohorts import fill, spring_document
 from sending import Api, impact_body
 
-from headimpact.calibration import RefitOptions, fitted_model, make_cohort, refit
-from headimpact.model_document import model_to_document
 from headimpact_service.cli import refit as refit_command
 from headimpact_service.deps import SCOPES
 from headimpact_service.intake.cron import next_due
@@ -58,11 +55,7 @@ Do = Callable[[dict[str, Any]], dict[str, Any]]
 @pytest.fixture(scope="module")
 def spring() -> dict[str, Any]:
     """The document of a model that was fitted elsewhere."""
-    generator = np.random.default_rng(4)
-    bam = generator.gamma(1.5, 0.04, (300, 3))
-    hurt = (generator.random(300) < 1 / (1 + np.exp(5 - bam @ np.array([18.0, 12.0, 20.0])))).astype(float)
-    cohort = make_cohort(hurt, [f"a{i % 30}" for i in range(300)], {"bam": bam, "bric": bam.sum(axis=1, keepdims=True)})
-    return model_to_document(fitted_model(refit(cohort, RefitOptions(replicas=0)), "spring"))
+    return spring_document()
 
 
 def register(api: Api, document: dict[str, Any]) -> None:
