@@ -20,6 +20,31 @@ from headimpact.published import QUALITY_LIMITS
 FloatArray = NDArray[np.float64]
 Severity = Literal["note", "warning"]
 AXES = ("x", "y", "z")
+CODES: tuple[str, ...] = (
+    "low_sample_rate",
+    "resampled",
+    "gaps_filled",
+    "extreme_value",
+    "implausible_units",
+    "saturated",
+    "edge_glitch",
+    "constant_channel",
+    "identical_channels",
+    "record_truncated",
+    "angular_acceleration_mismatch",
+    "vendor_peak_mismatch",
+    "angular_velocity_integrated",
+    "filter_skipped",
+    "low_rate_for_class",
+    "out_of_plane_removed",
+    "channel_missing",
+    "questionable_data",
+    "sample_count_mismatch",
+    "not_worn",
+    "outside_model_population",
+    "duplicate_content",
+)
+"""Every note there is: those of the files and of the athletes too."""
 
 
 @dataclass(frozen=True, slots=True)

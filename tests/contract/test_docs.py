@@ -16,6 +16,7 @@ from sending import Api
 
 from headimpact.criteria import CRITERIA
 from headimpact.criteria.extra import EXTRA_CRITERIA
+from headimpact.quality import CODES
 from headimpact_service import __version__
 from headimpact_service.__main__ import app
 from headimpact_service.app import OPERATIONS
@@ -124,6 +125,7 @@ def test_every_quality_code_of_the_code_has_a_meaning_and_a_remedy_and_no_other_
         (code, word) for cell, severity, *_ in listed for word in severity.split(", ") for code in spans(cell)
     }
     assert documented == set(quality_notes())
+    assert {code for code, _ in documented} == set(CODES)
     assert all(meaning and remedy for *_, meaning, remedy in listed)
 
 

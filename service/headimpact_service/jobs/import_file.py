@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from headimpact_service.errors import Problem
 from headimpact_service.intake.importing import COUNTED, store, summary
 from headimpact_service.jobs.import_compute import Chunk
 from headimpact_service.jobs.runs import House, Outcome, Result, Work
@@ -30,6 +31,10 @@ class ImportFile:
                     work.commit(value.number, len(value.ready), partial(_store, work.job.data_set_id, value, room))
                 else:
                     work.expect(value)
+        counts = self.result(work.outcomes).short["summary"]
+        if counts["failed"] and not counts["created"] + counts["unchanged"]:
+            detail = f"None of the file's {counts['failed']} impacts could be stored; `result` says why."
+            raise Problem("unreadable-file", detail)
 
     def result(self, outcomes: Sequence[Outcome]) -> Result:
         """How many were created, unchanged and failed, and the first of those that failed."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, WithJsonSchema
 from starlette.responses import Response
 
+from headimpact.quality import CODES
 from headimpact_service import deps, examples
 from headimpact_service.answers import JSON, answer, json_bytes, no_content
 from headimpact_service.errors import invalid_parameter, not_found
@@ -82,6 +83,15 @@ def _answer(impact: Impact, status: int, scored: Scored | None, *, redelivered: 
     return answer(json_bytes(document), status, headers)
 
 
+def _known_code(code: str) -> str:
+    if code not in CODES:
+        raise ValueError(f"A quality note is one of: {', '.join(CODES)}.")
+    return code
+
+
+QualityCode = Annotated[str, AfterValidator(_known_code), WithJsonSchema({"type": "string", "enum": list(CODES)})]
+
+
 class ImpactQuery(SyncQuery):
     """Which impacts."""
 
@@ -91,7 +101,7 @@ class ImpactQuery(SyncQuery):
     session_id: Text = Field(None, description="Of this session.")
     occurred_from: Annotated[Instant | None, Field(description="At this time or later.")] = None
     occurred_to: Annotated[Instant | None, Field(description="Before this time.")] = None
-    quality: Annotated[str | None, Field(pattern=r"^[a-z_]{1,64}$", description="With this quality note.")] = None
+    quality: QualityCode | None = Field(None, description="With this quality note.")
     criterion: Annotated[CriterionKey | None, Field(description="The one that `min_probability` is about.")] = None
     min_probability: Annotated[
         Probability | None, Field(description="Where `criterion` gives at least this probability.")

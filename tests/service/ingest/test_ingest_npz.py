@@ -162,7 +162,7 @@ def header(text: str, version: bytes = b"\x01\x00") -> bytes:
         (npz(a=np.zeros((2, 3, 3)), b=np.array([{"x": 1}], dtype=object)), "pickles"),
         (npz(a=np.zeros(3, dtype=[("x", "f8")])), "hold numbers, text or times"),
         (npz(a=np.zeros((2, 3, 3), dtype=complex)), "hold numbers, text or times"),
-        (npz(a=np.arange(3.0)), "no array of samples"),
+        (npz(a=np.arange(3.0)), "columns of no signal"),
         (npz(a=np.zeros((2, 3, 3, 3))), "no array of samples"),
         (npz(a=np.zeros((2, 3, 3)), b=np.zeros((2, 3, 3, 3))), "three dimensions"),
         (npz(a=np.zeros((2, 3, 65))), "1 to 64 components"),
@@ -209,3 +209,28 @@ def test_names_that_are_asked_for_as_samples_and_the_reverse_are_refused():
     problem = refused(stored, mapping=Mapping.model_validate(named), sample_rate_hz=1000.0)
     assert isinstance(problem, Problem)
     assert "not one value an impact" in problem.detail or "one value an impact" in problem.detail
+
+
+def test_an_array_for_each_channel_is_one_impact():
+    values = noise(1)[0]
+    names = [f"{symbol}{axis}" for symbol in "aw" for axis in "xyz"]
+    mapping = {
+        signal: {"unit": unit} | {axis: f"{symbol}{axis}" for axis in "xyz"}
+        for signal, unit, symbol in (("linear_acceleration", "g", "a"), ("angular_velocity", "rad/s", "w"))
+    } | {"time": {"column": "t", "unit": "ms"}}
+    channels = {name: values[:, column] for column, name in enumerate(names)}
+    (found,) = records(
+        npz(**channels, t=np.arange(40) / 3.2, external_id=np.array("one")), mapping=Mapping.model_validate(mapping)
+    )
+    np.testing.assert_array_equal(samples_of(found), values)
+
+
+@pytest.mark.parametrize(
+    ("arrays_", "told"),
+    [
+        ({"ax": np.zeros(5), "ay": np.zeros(6)}, "differ in length"),
+        ({"name": np.array("x")}, "no array of samples"),
+    ],
+)
+def test_channels_that_do_not_fit_are_refused(arrays_: dict[str, Any], told: str):
+    assert told in refused(npz(**arrays_)).detail

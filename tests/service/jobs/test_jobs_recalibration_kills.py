@@ -43,11 +43,16 @@ class Worker:
 
     def kill(self) -> None:
         self._process.send_signal(signal.SIGKILL)
-        self._process.wait()
+        self._ended()
 
     def stop(self) -> int:
         self._process.send_signal(signal.SIGTERM)
-        return self._process.wait(60)
+        return self._ended()
+
+    def _ended(self) -> int:
+        assert self._process.stdout is not None
+        with self._process.stdout:
+            return self._process.wait(60)
 
 
 class House:

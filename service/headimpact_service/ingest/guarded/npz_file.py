@@ -94,7 +94,7 @@ def _size(member: _Member) -> int:
 def _table(archive: GuardedZip, members: list[_Member], units: dict[str, str]) -> ArrayTable:
     shaped = [member for member in members if not member.is_text and len(member.shape) in (2, 3)]
     if not shaped:
-        raise unreadable("The npz archive holds no array of samples: impacts x samples x components.")
+        return _by_channel(archive, members, units)
     if any(len(member.shape) > 3 for member in members):
         raise unreadable("An array has at most three dimensions: impacts x samples x components.")
     several = any(len(member.shape) == 3 for member in shaped)
@@ -109,6 +109,17 @@ def _table(archive: GuardedZip, members: list[_Member], units: dict[str, str]) -
     # A signal's own times are looked for before it.
     samples.sort(key=lambda array: array.width != 1)
     return ArrayTable(samples, facts, units)
+
+
+def _by_channel(archive: GuardedZip, members: list[_Member], units: dict[str, str]) -> ArrayTable:
+    """One impact, an array for each channel: rows of numbers of one length, and facts beside them."""
+    rows = [member for member in members if not member.is_text and len(member.shape) == 1 and member.shape[0] > 1]
+    if not rows:
+        raise unreadable("The npz archive holds no array of samples: impacts x samples x components.")
+    if len({member.shape for member in rows}) > 1:
+        raise unreadable("The arrays of the channels differ in length.")
+    facts = [_fact(archive, member, 1) for member in members if member not in rows]
+    return ArrayTable([_repeated(archive, member, 1) for member in rows], facts, units)
 
 
 def _is_along_samples(member: _Member, impacts: int, lengths: set[int]) -> bool:
@@ -135,7 +146,7 @@ def _samples(archive: GuardedZip, member: _Member, *, several: bool) -> Samples:
 
 
 def _repeated(archive: GuardedZip, member: _Member, impacts: int) -> Samples:
-    """Times that all impacts share."""
+    """A row of numbers that all impacts share, as times; of a single impact, a channel."""
     row = _numbers(archive, member).reshape(1, -1, 1)
     return Samples(member.name, impacts, row.shape[1], 1, lambda count: np.repeat(row, count, axis=0))
 
