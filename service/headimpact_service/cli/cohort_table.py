@@ -19,6 +19,8 @@ from headimpact.calibration import Cohort, make_cohort
 from headimpact.criteria import BY_KEY, CRITERION_KEYS
 from headimpact.eligibility import exclusion_reason, outcome_of
 from headimpact.errors import CalibrationError
+from headimpact_service.cli.strain_table import COLUMNS as STRAINS
+from headimpact_service.cli.strain_table import strain_document
 
 REQUIRED = ("athlete_id", "outcome")
 READ_TOO = ("id", "revision", "event", "athlete_consent", "worn")
@@ -48,6 +50,8 @@ class CohortTable:
         How many rows stayed out, by reason.
     ignored
         Columns that nothing is made of.
+    strain
+        Regressions of finite-element results, where the table has some, on all of its rows.
     """
 
     cohort: Cohort
@@ -55,6 +59,7 @@ class CohortTable:
     rows: int
     excluded: Mapping[str, int]
     ignored: tuple[str, ...]
+    strain: Mapping[str, Any] | None
 
     def resamples(self, drawn: Sequence[Sequence[int]]) -> list[list[int]]:
         """Rows of the table as positions among those that entered.
@@ -106,14 +111,22 @@ def read_cohort(path: Path, include: frozenset[str] = frozenset()) -> CohortTabl
         told = ", ".join(f"{count} {reason}" for reason, count in sorted(excluded.items()))
         raise CalibrationError("no-impacts", f"No row of the table enters the cohort ({told or 'it has no rows'}).")
     known = np.array([outcome[row] for row in entering], dtype=np.float64)
-    read = {name for names in keys.values() for name in names} | {*REQUIRED, *READ_TOO}
+    read = {name for names in keys.values() for name in names} | {*REQUIRED, *READ_TOO, *STRAINS}
     return CohortTable(
         make_cohort(known, athletes, criteria, identities=_identities(columns, entering)),
         tuple(entering),
         len(outcome),
         dict(sorted(excluded.items())),
         tuple(name for name in columns if name not in read),
+        _strain(columns, keys),
     )
+
+
+def _strain(columns: Mapping[str, Sequence[Any]], keys: Mapping[str, Sequence[str]]) -> Mapping[str, Any] | None:
+    rows = range(len(columns["outcome"]))
+    strains = {name: _numbers(columns, name, rows) for name in STRAINS if name in columns}
+    bam = np.stack([_numbers(columns, name, rows) for name in keys["bam"]], axis=1) if "bam" in keys else None
+    return strain_document(strains, bam)
 
 
 def _columns(path: Path) -> dict[str, list[Any]]:

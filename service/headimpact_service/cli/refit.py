@@ -69,7 +69,11 @@ def run(table: Path, out: Path, request: Request) -> None:
         given["resamples"] = held.resamples(read_resamples(request.resamples, held.rows))
     found = refit(held.cohort, RefitOptions(**given), active)
     model = _model(found, request.version)
-    document = report_document(found) | {"table": _table_document(held), "model": model and model.version}
+    document = report_document(found) | {
+        "table": _table_document(held),
+        "model": model and model.version,
+        "strain": held.strain,
+    }
     written = {
         REPORT: json_bytes(document) + b"\n",
         PAGE: refit_page(found, document, model, active).encode(),

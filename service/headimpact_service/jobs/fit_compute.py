@@ -65,6 +65,7 @@ def _fitted(arguments: Mapping[str, Any], selected: Selected, active: RiskModel)
     report = report_document(found) | {
         "table": {"rows": cohort.n + sum(selected.excluded.values()), "excluded": dict(selected.excluded)},
         "model": model.version,
+        "strain": None,
         "drift": drift_document(selected, active, options_of(fit).tau),
         "gates": _gates(arguments, found, model, active),
     }

@@ -257,6 +257,31 @@ class TestTables:
         assert one["out_of_fold"]["reason"]
 
 
+class TestStrain:
+    def test_finite_element_results_are_regressed_on_the_brain_angle(self, tmp_path: Path, run: Run) -> None:
+        columns = flat_export()
+        bam = np.array([columns[f"bam_{axis}"] for axis in "xyz"], dtype=float).T
+        columns["peak_principal_strain"] = (0.05 + 0.9 * np.linalg.norm(bam, axis=1)).tolist()
+        columns["corpus_callosum_strain"] = [*(0.02 + bam @ np.array([0.3, 0.2, 0.6]))[:-1].tolist(), ""]
+        write(tmp_path / "t.csv", columns)
+        code, _, error = run("refit", "--table", "t.csv", "--out", "out", "--criterion", "bric", "--replicas", "10")
+        assert (code, error) == (0, "")
+        strain = json.loads((tmp_path / "out/report.json").read_text())["strain"]
+        assert strain["peak_principal_strain"]["coefficients"] == pytest.approx({"intercept": 0.05, "resultant": 0.9})
+        callosum = strain["corpus_callosum_strain"]
+        assert callosum["n"] == 913
+        assert callosum["coefficients"] == pytest.approx({"intercept": 0.02, "x": 0.3, "y": 0.2, "z": 0.6})
+        assert callosum["r_squared"] == pytest.approx(1.0)
+        assert "corpus callosum strain" in (tmp_path / "out/report.html").read_text()
+
+    def test_strains_without_brain_angles_say_what_is_missing(self, tmp_path: Path, run: Run) -> None:
+        columns = simulated() | {"csdm15": [0.1] * 120}
+        write(tmp_path / "t.csv", columns)
+        run("refit", "--table", "t.csv", "--out", "out", "--replicas", "10")
+        strain = json.loads((tmp_path / "out/report.json").read_text())["strain"]
+        assert "bam_x" in strain["csdm15"]["reason"]
+
+
 class TestModels:
     def test_a_model_is_registered_listed_promoted_and_rolled_back(self, done: Path, run: Run) -> None:
         model = str(done / "model.json")
