@@ -111,6 +111,7 @@ def check_rescored(house: House, job: dict[str, Any], impacts: int) -> None:
     assert Counter(model for _, model in scores) == {"laksari-2020": impacts, "spring": impacts}
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("house", [600], indirect=True)
 def test_a_re_score_and_a_fit_survive_a_kill_of_the_service(house: House) -> None:
     rescore = house.post("/v1/models/spring/scores", {})["id"]

@@ -35,7 +35,9 @@ class TestFilter:
         noted = sent(api, slow)
         assert notes(noted, "low_sample_rate")
         assert found(api, quality="low_sample_rate") == [noted["id"]]
-        assert found(api, quality="low_sample") == []
+        refused = api.get("/v1/impacts", params={"quality": "low_sample"})
+        assert refused.status_code == 422
+        assert "low_sample_rate" in refused.json()["errors"][0]["detail"]
 
     def test_a_duplicate_is_found_and_names_the_other(self, api: Api) -> None:
         first, second = api.create("e-1"), api.create("e-2")
