@@ -39,8 +39,9 @@ def children() -> list[str]:
         except OSError:
             continue
     own = Path("/proc/self/cmdline").read_bytes()
-    # A child that has not yet become a program of its own still shows the memory of this one.
-    return [child for child in found if _command(child) != own]
+    # A child that has not yet become a program of its own still shows the memory of this one; one that is about to has
+    # no command line for a moment.
+    return [child for child in found if _command(child) not in {own, b""}]
 
 
 def _command(process: str) -> bytes:
