@@ -13,10 +13,9 @@ from sqlalchemy import Connection
 from starlette.applications import Starlette
 from starlette.requests import Request
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS
 from headimpact_service.errors import Problem
-from headimpact_service.intake import registry
-from headimpact_service.intake.scoring import Terms, requests_of
+from headimpact_service.intake import registry, scoring
+from headimpact_service.intake.scoring import Terms
 from headimpact_service.settings import Settings
 from headimpact_service.store import ids, jobs, keys
 from headimpact_service.store.database import Database
@@ -122,9 +121,8 @@ def _unauthenticated(detail: str) -> Problem:
 
 def terms_of(conn: Connection, key: keys.KeyRow) -> Terms:
     """What the impacts of the key's data set are scored with."""
-    points = requests_of(key.operating_points)
     model = registry.DEFAULT if key.model is None else registry.model_of(conn, key.data_set_id, key.model)
-    return Terms(incidence=key.incidence, operating_points=points or DEFAULT_OPERATING_POINTS, model=model)
+    return scoring.terms_of(key.incidence, key.operating_points, model)
 
 
 async def authorize(request: Request, access: str) -> Caller:

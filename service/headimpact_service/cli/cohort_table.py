@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from headimpact.calibration import Cohort, make_cohort
-from headimpact.criteria import BY_KEY, CRITERION_KEYS
+from headimpact.criteria import CRITERION_KEYS
 from headimpact.eligibility import exclusion_reason, outcome_of
 from headimpact.errors import CalibrationError
 from headimpact_service.cli.strain_table import COLUMNS as STRAINS
 from headimpact_service.cli.strain_table import strain_document
+from headimpact_service.store.tables import CRITERION_COLUMNS
 
 REQUIRED = ("athlete_id", "outcome")
 READ_TOO = ("id", "revision", "event", "athlete_consent", "worn")
@@ -185,14 +186,13 @@ def _require_distinct(names: Sequence[str]) -> None:
 def _criteria(columns: Mapping[str, Any]) -> dict[str, list[str]]:
     """The columns of each criterion that the table has."""
     found = {}
-    for key in CRITERION_KEYS:
-        names = [key] if BY_KEY[key].components == 1 else [f"{key}_{axis}" for axis in "xyz"]
+    for key, names in CRITERION_COLUMNS.items():
         there = [name for name in names if name in columns]
-        if there and there != names:
+        if there and there != list(names):
             lacking = next(name for name in names if name not in columns)
             raise TableError(f"The table has {there[0]} but no {lacking}: {key} has three components.")
         if there:
-            found[key] = names
+            found[key] = list(names)
     if not found:
         raise TableError(
             f"The table has no column of a criterion; such are: bam_x, bam_y, bam_z, {', '.join(CRITERION_KEYS[2:4])}."

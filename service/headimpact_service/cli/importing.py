@@ -13,7 +13,6 @@ from typing import Any, Literal, cast
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS
 from headimpact_service.cli.database import migrated
 from headimpact_service.cli.faults import USAGE, problem_line
 from headimpact_service.cli.score import with_mapping
@@ -22,7 +21,7 @@ from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.upload import read_upload
 from headimpact_service.intake.importing import COUNTED, look_up, make_ready, preview_row, score_found, store, summary
 from headimpact_service.intake.registry import active_model
-from headimpact_service.intake.scoring import Terms, requests_of
+from headimpact_service.intake.scoring import Terms, terms_of
 from headimpact_service.store import organisation_settings, organisations
 from headimpact_service.store.database import Database
 
@@ -108,13 +107,8 @@ def _target(database: Database, organisation: str, mode: str) -> Target:
     def find(conn: Any) -> Target:  # noqa: ANN401 - a connection of the store
         found = organisations.ensure(conn, organisation)
         settings = organisation_settings.get(conn, found.id)
-        points = requests_of(settings.operating_points)
         data_set = organisations.ensure_data_set(conn, found.id, cast("Literal['live', 'test']", mode))
-        terms = Terms(
-            incidence=settings.incidence,
-            operating_points=points or DEFAULT_OPERATING_POINTS,
-            model=active_model(conn, data_set),
-        )
+        terms = terms_of(settings.incidence, settings.operating_points, active_model(conn, data_set))
         return Target(data_set, terms)
 
     return database.write(find)

@@ -9,7 +9,6 @@ from headimpact.model_document import model_from_text, model_to_document
 from headimpact.risk import PUBLISHED_MODELS
 from headimpact_service.cli.database import migrated
 from headimpact_service.intake import registry
-from headimpact_service.intake.scoring import Terms, operating_points, requests_of
 from headimpact_service.store import aliases, models, organisation_settings, organisations
 from headimpact_service.store.database import Database
 from headimpact_service.store.models import NewModel
@@ -53,10 +52,9 @@ def promote(version: str, *, reason: str, organisation: str, mode: str, database
         def change(conn: Any) -> str | None:  # noqa: ANN401
             model = registry.model_of(conn, data_set, version)
             found = organisations.find(conn, organisation)
-            settings = None if found is None else organisation_settings.get(conn, found.id)
-            if settings is not None and settings.operating_points:
-                terms = Terms(incidence=settings.incidence, model=model)
-                operating_points(requests_of(settings.operating_points), terms)
+            if found is not None:
+                settings = organisation_settings.get(conn, found.id)
+                registry.require_promotable(model, settings.incidence, settings.operating_points)
             before = registry.active_model(conn, data_set).version
             aliases.put(conn, data_set, "active", version, reason)
             return before

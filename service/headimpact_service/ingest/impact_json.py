@@ -9,9 +9,9 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 
-from headimpact_service.ingest.times import instant
+from headimpact_service.ingest.times import instant, known_zone
 
 MIN_SAMPLES = 3
 MAX_SAMPLES = 20_000
@@ -27,6 +27,11 @@ PRINTABLE = r"^[^\u0000-\u001f\u007f]+$"
 MAX_NAME = 200
 
 
+def _zone(name: str) -> str:
+    known_zone(name)
+    return name
+
+
 def _moment(value: object) -> object:
     """The instant of a time with its offset; whatever is no text is left to be refused."""
     return instant(value) if isinstance(value, str) else value
@@ -39,6 +44,7 @@ Word = Annotated[str, Field(min_length=1, max_length=64, pattern=PRINTABLE)]
 Samples = Annotated[list[float], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES, fail_fast=True)]
 # Null is a missing sample, which is taken only where it is to be filled or the record is not to be scored.
 Components = Annotated[list[float | None], Field(min_length=MIN_SAMPLES, max_length=MAX_SAMPLES, fail_fast=True)]
+Zone = Annotated[str, Field(max_length=64), AfterValidator(_zone)]
 Moment = Annotated[datetime, BeforeValidator(_moment)]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]

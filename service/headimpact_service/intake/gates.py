@@ -15,25 +15,13 @@ import numpy as np
 from scipy.special import expit
 
 from headimpact.calibration import Refit
+from headimpact.calibration.cohort import component_names
 from headimpact.calibration.criterion_refit import CriterionRefit
 from headimpact.calibration.discrimination import resampled
 from headimpact.calibration.resampling import counts_of_clusters, drawn_with_replacement
-from headimpact.criteria import BY_KEY
 from headimpact.errors import OperatingPointUnreachable
 from headimpact.risk import OperatingPointRequest, RiskModel, resolve_operating_point
 
-DEFAULTS: Mapping[str, Any] = {
-    "criteria": ["bam"],
-    "min_events": 30,
-    "min_athletes_with_events": 15,
-    "max_condition_number": 1e8,
-    "max_auc_loss": 0.02,
-    "expected_over_observed": [0.8, 1.25],
-    "calibration_slope": [0.8, 1.2],
-    "waive_lowering": [],
-    "max_panel_change": 0.15,
-    "sensitivity": 0.9,
-}
 REPLICAS = 500
 PANEL_ROWS = 200
 
@@ -54,9 +42,8 @@ class Judged:
         return asdict(self)
 
 
-def judge(found: Refit, model: RiskModel, active: RiskModel, gates: Mapping[str, Any]) -> list[Judged]:
-    """All gates, in an order that a reader can follow. `gates` overrides :data:`DEFAULTS`."""
-    bounds = {**DEFAULTS, **{name: value for name, value in gates.items() if value is not None}}
+def judge(found: Refit, model: RiskModel, active: RiskModel, bounds: Mapping[str, Any]) -> list[Judged]:
+    """All gates, in an order that a reader can follow; `bounds` are complete, as a schedule keeps them."""
     judged = [_events(found, bounds), _athletes(found, bounds)]
     for name in bounds["criteria"]:
         one = found.criteria.get(name)
@@ -102,7 +89,7 @@ def _of_criterion(
 
 
 def _lowering(name: str, one: CriterionRefit, bounds: Mapping[str, Any]) -> Judged:
-    axes = ["value"] if BY_KEY[name].components == 1 else ["x", "y", "z"]
+    axes = component_names(name)
     lowering = [axes[i] for i in one.lowering]
     waived = set(bounds["waive_lowering"])
     left = [axis for axis in lowering if f"{name}.{axis}" not in waived and name not in waived]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from headimpact.model_document import model_from_document
 from headimpact.risk import LAKSARI_2020, PUBLISHED_MODELS, RiskModel
 from headimpact_service.errors import Problem, not_found
+from headimpact_service.intake.scoring import Terms, operating_points, requests_of
 from headimpact_service.store import aliases, models
 
 DEFAULT = LAKSARI_2020
@@ -38,6 +40,11 @@ def active_model(conn: Any, data_set_id: bytes) -> RiskModel:  # noqa: ANN401 - 
     """The model that scores the data set's new impacts."""
     version = aliases.get(conn, data_set_id, "active").version
     return DEFAULT if version is None else model_of(conn, data_set_id, version)
+
+
+def require_promotable(model: RiskModel, incidence: float | None, points: Sequence[Mapping[str, object]]) -> None:
+    """An `operating-point-unreachable` problem where the model lacks one that the organisation has set."""
+    operating_points(requests_of(points), Terms(incidence=incidence, model=model))
 
 
 def require_free(version: str) -> None:

@@ -199,6 +199,11 @@ def requests_of(stored: Iterable[Mapping[str, object]]) -> tuple[OperatingPointR
     return tuple(OperatingPointRequest(**point) for point in stored)  # type: ignore[arg-type]
 
 
+def terms_of(incidence: float | None, points: Iterable[Mapping[str, object]], model: RiskModel) -> Terms:
+    """The terms of an organisation, from its settings as they are kept, and the model in service."""
+    return Terms(incidence, requests_of(points) or DEFAULT_OPERATING_POINTS, model)
+
+
 def operating_points(asked: Sequence[OperatingPointRequest] | None, terms: Terms) -> tuple[OperatingPoint, ...]:
     """The thresholds that were asked for, in that order; the organisation's default where none were."""
     if asked is None:

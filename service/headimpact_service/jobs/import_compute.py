@@ -8,13 +8,12 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS, RiskModel
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.upload import read_upload
 from headimpact_service.intake.importing import Ready, look_up, make_ready, score_found
 from headimpact_service.intake.registry import DEFAULT, model_of
-from headimpact_service.intake.scoring import Terms, requests_of
+from headimpact_service.intake.scoring import Terms, terms_of
 from headimpact_service.store.database import Database
 
 
@@ -44,7 +43,7 @@ def compute(arguments: dict[str, Any]) -> Iterator[int | Chunk]:
         with database.read() as conn:
             # A job that was ordered by a version which knew one model only does not say which.
             model = model_of(conn, arguments["data_set_id"], arguments.get("model", DEFAULT.version))
-        terms = _terms(arguments["terms"], model)
+        terms = terms_of(arguments["terms"]["incidence"], arguments["terms"]["operating_points"], model)
         yield from _chunks(database, read_upload(path, options), size, terms, arguments)
     finally:
         database.close()
@@ -63,8 +62,3 @@ def _chunks(
         with database.read() as conn:
             known = look_up(conn, data_set_id, part)
         yield Chunk(number, number * size, make_ready(score_found(part, known, terms), key_id))
-
-
-def _terms(sent: dict[str, Any], model: RiskModel) -> Terms:
-    points = requests_of(sent["operating_points"])
-    return Terms(incidence=sent["incidence"], operating_points=points or DEFAULT_OPERATING_POINTS, model=model)

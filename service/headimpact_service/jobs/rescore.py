@@ -47,6 +47,8 @@ class Rescore:
             "data_set_id": job.data_set_id,
             "total": job.total,
             "first": len(done),
+            # Identifiers grow with time: what comes later than the order is not the job's.
+            "until": job.id,
             "after": done[-1]["last"] if done else bytes(16).hex(),
         }
 

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from headimpact.risk import DEFAULT_OPERATING_POINTS
 from headimpact_service.errors import Problem
 from headimpact_service.intake.cohorts import filter_of
 from headimpact_service.intake.records import rebuild_record
 from headimpact_service.intake.registry import model_of
 from headimpact_service.intake.rendering import new_score
-from headimpact_service.intake.scoring import UNKNOWN_DEVICE, Terms, requests_of, score_records
+from headimpact_service.intake.scoring import UNKNOWN_DEVICE, Terms, score_records, terms_of
 from headimpact_service.store import cohorts, impacts, traces
 from headimpact_service.store.database import Database
 from headimpact_service.store.score_rows import NewScore
@@ -39,7 +38,7 @@ def compute(arguments: dict[str, Any]) -> Iterator[int | Rescored]:
 
 def _parts(database: Database, arguments: dict[str, Any]) -> Iterator[int | Rescored]:
     data_set_id, wanted = arguments["data_set_id"], filter_of(arguments["cohort"])
-    until, last = bytes.fromhex(arguments["until"]), bytes.fromhex(arguments["after"])
+    until, last = arguments["until"], bytes.fromhex(arguments["after"])
     with database.read() as conn:
         if arguments["total"] is None:
             yield cohorts.count(conn, data_set_id, wanted, until=until)
@@ -58,9 +57,8 @@ def _parts(database: Database, arguments: dict[str, Any]) -> Iterator[int | Resc
 
 def _terms(conn: Any, arguments: dict[str, Any]) -> Terms:  # noqa: ANN401 - a connection of the store
     sent = arguments["terms"]
-    points = requests_of(sent["operating_points"])
     model = model_of(conn, arguments["data_set_id"], arguments["version"])
-    return Terms(incidence=sent["incidence"], operating_points=points or DEFAULT_OPERATING_POINTS, model=model)
+    return terms_of(sent["incidence"], sent["operating_points"], model)
 
 
 def _scored(

@@ -16,11 +16,13 @@ from matplotlib.style import context as style
 from matplotlib.ticker import NullLocator
 from scipy.special import expit
 
+from headimpact.calibration.cohort import component_names, parts_of
 from headimpact.calibration.criterion_refit import CriterionRefit
 from headimpact.calibration.refit import Refit
 from headimpact.criteria import BY_KEY
 from headimpact.risk import RiskCurve, RiskModel
 from headimpact.risk_map import RiskMap, draw_risk_map
+from headimpact.scoring import NORMAL_975
 
 STYLE = {
     "svg.fonttype": "none",
@@ -44,7 +46,7 @@ AXIS_COLOURS = ("#0b5394", "#b45f06", "#38761d")
 
 def criterion_name(name: str) -> str:
     """What a criterion is called, or several that are fitted together."""
-    return " + ".join(BY_KEY[key].name for key in name.split("+"))
+    return " + ".join(BY_KEY[key].name for key in parts_of(name))
 
 
 def deviance_bars(found: Refit) -> str | None:
@@ -214,7 +216,7 @@ def _calibration_points(y: np.ndarray, p: np.ndarray, weights: np.ndarray) -> li
         if outcome.sum() == 0:
             continue
         share = float((w * outcome).sum() / w.sum())
-        half = 1.959964 / np.sqrt(outcome.sum())  # of the logarithm of a count
+        half = NORMAL_975 / np.sqrt(outcome.sum())  # of the logarithm of a count
         interval = share * np.exp(-half), min(share * np.exp(half), 1.0)
         points.append((float((w * p[members]).sum() / w.sum()), share, *interval))
     return points
@@ -291,7 +293,7 @@ def coefficient_comparison(name: str, model: RiskModel, active: RiskModel) -> st
 
     def draw(axes: Sequence[Axes]) -> None:
         (ax,) = axes
-        labels = ["x", "y", "z"] if len(new.b) == 3 else ["value"]
+        labels = component_names(name)
         places = np.arange(len(labels), dtype=float)
         ax.axhline(0, color=MUTED, linewidth=0.8)
         for offset, curve, version, colour in ((-0.12, old, active.version, OTHER), (0.12, new, model.version, LINE)):
@@ -307,7 +309,7 @@ def coefficient_comparison(name: str, model: RiskModel, active: RiskModel) -> st
 def _half_widths(curve: RiskCurve) -> list[float] | None:
     if curve.covariance is None:
         return None
-    return [1.959964 * float(np.sqrt(curve.covariance[i][i])) for i in range(1, len(curve.b) + 1)]
+    return [NORMAL_975 * float(np.sqrt(curve.covariance[i][i])) for i in range(1, len(curve.b) + 1)]
 
 
 def _svg(draw: Callable[[Sequence[Axes]], None], panels: int, size: tuple[float, float]) -> str:

@@ -6,14 +6,13 @@ from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from anyio.to_thread import run_sync
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import BaseModel, Field
 from starlette.responses import Response
 
 from headimpact_service import deps
 from headimpact_service.answers import answer, no_content
 from headimpact_service.errors import not_found
-from headimpact_service.ingest.impact_json import Name, Strict, Word
-from headimpact_service.ingest.times import known_zone
+from headimpact_service.ingest.impact_json import Name, Strict, Word, Zone
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import SyncQuery
 from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
@@ -23,11 +22,6 @@ from headimpact_service.store import athletes, ids
 from headimpact_service.store.athletes import Athlete, AthleteFields
 
 routes = Routes("athletes")
-
-
-def _zone(name: str) -> str:
-    known_zone(name)
-    return name
 
 
 class AthleteBody(Strict):
@@ -40,9 +34,7 @@ class AthleteBody(Strict):
     position: Word | None = Field(None, examples=["LB"])
     sex: Literal["male", "female", "other"] | None = None
     birth_year: Annotated[int, Field(ge=1900, le=2100)] | None = None
-    time_zone: Annotated[str, Field(max_length=64), AfterValidator(_zone)] | None = Field(
-        None, description="IANA zone of the athlete's days.", examples=["Europe/Dublin"]
-    )
+    time_zone: Zone | None = Field(None, description="IANA zone of the athlete's days.", examples=["Europe/Dublin"])
     consent: Literal["granted", "withdrawn"] | None = None
 
 

@@ -8,6 +8,8 @@ from pydantic import AfterValidator, Field, model_validator
 
 from headimpact.criteria import CRITERION_KEYS
 from headimpact_service.ingest.impact_json import CriterionKey, Fraction, Moment, Strict, Text, Word
+from headimpact_service.intake import registry
+from headimpact_service.intake.scoring import Terms
 
 MAX_REPLICAS = 10_000
 
@@ -96,9 +98,9 @@ class GatesBody(Strict):
     )
 
 
-def stored(body: FitBody, incidence: float) -> dict[str, Any]:
+def stored(body: FitBody, terms: Terms) -> dict[str, Any]:
     """A fit as jobs and schedules keep it: JSON, complete, with the incidence that holds now."""
     document = body.model_dump(mode="json", exclude_none=True)
     if body.sampling == "case_control":
-        document.setdefault("incidence", incidence)
+        document.setdefault("incidence", terms.incidence or registry.DEFAULT.incidence)
     return document

@@ -17,7 +17,7 @@ from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.routes.fit_shapes import CohortBody, FitBody, stored
 from headimpact_service.routes.job_shapes import IDEMPOTENCY_KEY, LOCATION, JobView, accepted, idempotency_key
 from headimpact_service.routes.models import Version
-from headimpact_service.store import ids, models
+from headimpact_service.store import models
 from headimpact_service.store.jobs import Job, NewJob
 
 routes = Routes("models")
@@ -64,8 +64,7 @@ async def order_fit(call: Call) -> Response:
         taken = await deps.read(call.request, lambda conn: models.get(conn, call.data_set_id, body.version or ""))
         if taken is not None:
             raise Problem("conflict", "There is a model of this version, and versions do not change.")
-    incidence = call.terms.incidence or registry.DEFAULT.incidence
-    return accepted(await _order(call, "fit", {"fit": stored(body, incidence)}))
+    return accepted(await _order(call, "fit", {"fit": stored(body, call.terms)}))
 
 
 @routes(
@@ -100,8 +99,5 @@ async def order_rescore(call: Call) -> Response:
 async def _order(call: Call, kind: str, arguments: dict[str, Any]) -> Job:
     key = idempotency_key(call.request)
     asked = None if key is None else sha256(json_bytes([kind, arguments])).digest()
-    job_id = ids.new()
-    # Identifiers grow with time: what comes later than the order is not the job's.
-    ordered = arguments | {"until": job_id.hex()}
-    new = NewJob(id=job_id, kind=kind, arguments=ordered, key_id=call.key.id, idempotency_key=key, request_hash=asked)
+    new = NewJob(kind=kind, arguments=arguments, key_id=call.key.id, idempotency_key=key, request_hash=asked)
     return await deps.submit(call.request, call.data_set_id, new)

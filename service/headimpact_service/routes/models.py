@@ -11,6 +11,7 @@ from anyio.to_thread import run_sync
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
+from headimpact import model_document
 from headimpact.errors import ModelDocumentError, UnknownCriterion
 from headimpact.model_document import model_from_document, model_from_text, model_to_document
 from headimpact.risk import PUBLISHED_MODELS, RiskModel
@@ -21,7 +22,6 @@ from headimpact_service.bodies import read_body, require_media_type
 from headimpact_service.errors import PayloadError, Problem, invalid_parameter, not_found
 from headimpact_service.ingest.impact_json import Strict, Text
 from headimpact_service.intake import registry
-from headimpact_service.intake.scoring import Terms, operating_points
 from headimpact_service.operation import Answer, BodyForm, Call, Routes
 from headimpact_service.parameters import Query
 from headimpact_service.routes.model_shapes import (
@@ -39,7 +39,7 @@ from headimpact_service.store.models import NewModel, StoredModel
 
 routes = Routes("models")
 
-VERSION = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+VERSION = f"^{model_document.VERSION.pattern}$"
 Version = Annotated[str, Field(pattern=VERSION, max_length=100, examples=["laksari-2020"])]
 DOCUMENT_BYTES = 16 * 1024 * 1024
 ALIASES: tuple[AliasName, ...] = ("active", "candidate")
@@ -190,8 +190,8 @@ async def change_alias(call: Call) -> Response:
     def change(conn: Any) -> list[Alias]:  # noqa: ANN401 - a connection of the store
         if body.version is not None:
             model = registry.model_of(conn, call.data_set_id, body.version)
-            if name == "active" and call.key.operating_points:
-                operating_points(call.terms.operating_points, Terms(incidence=call.terms.incidence, model=model))
+            if name == "active":
+                registry.require_promotable(model, call.key.incidence, call.key.operating_points)
         aliases.put(conn, call.data_set_id, name, body.version, body.reason, call.key.id, if_match=revision)
         return aliases.history(conn, call.data_set_id, name)
 

@@ -12,9 +12,7 @@ from starlette.responses import Response
 from headimpact_service import deps
 from headimpact_service.answers import answer, no_content
 from headimpact_service.errors import invalid_parameter, not_found
-from headimpact_service.ingest.impact_json import Strict
-from headimpact_service.ingest.times import known_zone
-from headimpact_service.intake import registry
+from headimpact_service.ingest.impact_json import Strict, Zone
 from headimpact_service.intake.cron import next_due, require_cron
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.routes.fit_shapes import FitBody, GatesBody, stored
@@ -31,20 +29,13 @@ def _cron(expression: str) -> str:
     return expression
 
 
-def _zone(name: str) -> str:
-    known_zone(name)
-    return name
-
-
 class ScheduleBody(Strict):
     """When to fit, what, and what the model must pass."""
 
     cron: Annotated[str, Field(max_length=100), AfterValidator(_cron)] = Field(
         description="Five fields: minute, hour, day of the month, month, day of the week.", examples=["30 3 * * 1"]
     )
-    time_zone: Annotated[str, Field(max_length=64), AfterValidator(_zone)] = Field(
-        default="UTC", description="IANA zone of its clock."
-    )
+    time_zone: Zone = Field(default="UTC", description="IANA zone of its clock.")
     enabled: bool = True
     fit: FitBody = Field(default_factory=FitBody)
     gates: GatesBody = Field(default_factory=GatesBody)
@@ -129,12 +120,11 @@ async def put_schedule(call: Call) -> Response:
     revision = if_match(call.request)
     if body.promote and "models:promote" not in call.key.scopes:
         raise deps.scope_missing("models:promote")
-    incidence = call.terms.incidence or registry.DEFAULT.incidence
     new = NewSchedule(
         cron=body.cron,
         time_zone=body.time_zone,
         enabled=body.enabled,
-        fit=stored(body.fit, incidence),
+        fit=stored(body.fit, call.terms),
         gates=body.gates.model_dump(mode="json"),
         promote=body.promote,
     )
