@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import postgres
 import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 from sending import Api
@@ -15,6 +16,15 @@ from headimpact_service.deps import SCOPES
 from headimpact_service.settings import Settings
 from headimpact_service.store import keys
 from headimpact_service.store.database import Database
+
+BACKENDS = ("sqlite", "postgresql")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run what needs a database on each kind, unless the marker `backend` names those that it is about."""
+    if "backend" in metafunc.fixturenames:
+        marker = metafunc.definition.get_closest_marker("backend")
+        metafunc.parametrize("backend", BACKENDS if marker is None else marker.args)
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:
@@ -40,12 +50,42 @@ def migrated_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.fixture(scope="session")
+def postgresql_server() -> Iterator[postgres.Server]:
+    """A PostgreSQL server; started for the first test that needs it."""
+    with postgres.server() as server:
+        yield server
+
+
 @pytest.fixture
-def database(migrated_file: Path, tmp_path: Path) -> Iterator[Database]:
-    """A database of the test's own."""
+def database_url(backend: str, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[str]:
+    """The URL of a database of the test's own, at this version's schema."""
+    if backend == "postgresql":
+        server: postgres.Server = request.getfixturevalue("postgresql_server")
+        with server.emptied() as url:
+            yield url
+        return
     file = tmp_path / "headimpact.db"
-    shutil.copy(migrated_file, file)
-    database = Database(f"sqlite:///{file}")
+    shutil.copy(request.getfixturevalue("migrated_file"), file)
+    yield f"sqlite:///{file}"
+
+
+@pytest.fixture
+def empty_url(backend: str, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[str]:
+    """The URL of a database without tables."""
+    if backend == "postgresql":
+        server: postgres.Server = request.getfixturevalue("postgresql_server")
+        url = server.create()
+        yield url
+        server.drop(url)
+        return
+    yield f"sqlite:///{tmp_path / 'headimpact.db'}"
+
+
+@pytest.fixture
+def database(database_url: str) -> Iterator[Database]:
+    """A database of the test's own."""
+    database = Database(database_url)
     yield database
     database.close()
 

@@ -21,7 +21,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from headimpact_service.settings import Settings
-from headimpact_service.store.database import WAL_RESET_FIXED
+from headimpact_service.store.sqlite import WAL_RESET_FIXED
 
 PYPROJECT = tomllib.loads(text("pyproject.toml"))
 LOCKS = ["requirements.lock", "requirements-build.lock"]

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from headimpact.errors import HeadimpactError, ModelDocumentError
 from headimpact_service.errors import Problem
-from headimpact_service.store.database import DatabaseUrlError
+from headimpact_service.store.access import DatabaseUrlError
 from headimpact_service.store.migrate import MigrationError
 
 USAGE = 2

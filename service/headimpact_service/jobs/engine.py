@@ -14,6 +14,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sqlalchemy.engine import URL
+from sqlalchemy.exc import SQLAlchemyError
+
 from headimpact_service.deps import uploads_of
 from headimpact_service.intake.cron import next_due
 from headimpact_service.jobs import runs
@@ -21,11 +24,12 @@ from headimpact_service.jobs.fit import Fit
 from headimpact_service.jobs.import_file import ImportFile
 from headimpact_service.jobs.rescore import Rescore
 from headimpact_service.jobs.runs import House, Kind
-from headimpact_service.jobs.slots import Slot, SlotsTakenError
+from headimpact_service.jobs.slots import slot_of
 from headimpact_service.settings import Settings
 from headimpact_service.store import ids, job_runs, schedules
 from headimpact_service.store.database import Database
 from headimpact_service.store.jobs import Job
+from headimpact_service.store.slot import Slot, SlotLostError, SlotsTakenError
 from headimpact_service.store.uploads import job_folder
 
 if TYPE_CHECKING:
@@ -78,18 +82,22 @@ class Engine:
 
     def _work(self) -> None:
         try:
-            with Slot(self._folder) as slot:
+            with slot_of(self._house.database, self._folder) as slot:
                 while not self._house.stopping.is_set():
                     self._woken.clear()
                     self._round(slot)
                     self._woken.wait(TICK_S)
                 self._close()
-        except (OSError, SlotsTakenError):
-            logger.exception("No jobs run in this process: its folder beside the database cannot be used.")
+        except (OSError, SQLAlchemyError, SlotsTakenError):
+            logger.exception("No jobs run in this process: it could not take a place among those that work.")
 
     def _round(self, slot: Slot) -> None:
         try:
+            slot.keep()
             self._tick(slot)
+        except SlotLostError:
+            logger.exception("No jobs run in this process any more; start it again.")
+            self._house.stopping.set()
         except Exception:
             logger.exception("The job engine could not do its round; it tries again.")
 
@@ -112,11 +120,16 @@ class Engine:
     def _launch(self, slot: Slot) -> Transact:
         from headimpact_service.jobs.transact import Transact  # costs seconds: not before there is a job
 
-        launched = Transact(self._folder / "engine.db", slot.name, self._run, at_once=self._at_once)
+        launched = Transact(self._records(), slot.name, self._run, at_once=self._at_once)
         # What was loaded stays; the many objects of a part would have the collector look through it again and again.
         gc.collect()
         gc.freeze()
         return launched
+
+    def _records(self) -> URL:
+        """Where DBOS keeps what it knows of the runs."""
+        database = self._house.database
+        return URL.create("sqlite", database=str(self._folder / "engine.db")) if database.is_file else database.url
 
     def _bring(self, transact: Transact, unfinished: Iterable[Job]) -> None:
         """Order a run of every job that has none; one whose run ended without ending the job gets another."""

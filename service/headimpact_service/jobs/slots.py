@@ -1,8 +1,4 @@
-"""Which processes are alive: each holds the lock of one numbered slot, which the system frees when it dies.
-
-A process that starts takes the first free slot, so that after a crash it finds itself under the same name as before
-and takes its own work up at once; the work of others it takes over once their slot has stayed free for a while.
-"""
+"""The slot of a process beside a database that is a file: the lock of a file, which the system frees when it dies."""
 
 from __future__ import annotations
 
@@ -11,14 +7,17 @@ import os
 from pathlib import Path
 from types import TracebackType
 
-SLOTS = 64
+from headimpact_service.store.database import Database
+from headimpact_service.store.server_slots import ServerSlot
+from headimpact_service.store.slot import SLOTS, Slot, SlotsTakenError, slot_name, slot_number
 
 
-class SlotsTakenError(RuntimeError):
-    """More processes work on this database than there are slots."""
+def slot_of(database: Database, folder: Path) -> Slot:
+    """The first free slot of a database; `folder` is beside it, if it is a file."""
+    return FileSlot(folder) if database.is_file else ServerSlot(database.url)
 
 
-class Slot:
+class FileSlot:
     """A slot that this process holds."""
 
     def __init__(self, folder: Path) -> None:
@@ -27,7 +26,7 @@ class Slot:
         self._folder = folder
         self.number, self._handle = self._first_free()
 
-    def __enter__(self) -> Slot:
+    def __enter__(self) -> FileSlot:
         """Itself."""
         return self
 
@@ -38,22 +37,25 @@ class Slot:
     @property
     def name(self) -> str:
         """What this process is called in the engine's records."""
-        return f"slot-{self.number}"
+        return slot_name(self.number)
+
+    def keep(self) -> None:
+        """It is held until the process ends."""
 
     def is_free(self, name: str) -> bool:
         """Whether no living process holds the slot of this name."""
-        number = name.removeprefix("slot-")
-        if not number.isdecimal() or int(number) == self.number:
+        number = slot_number(name)
+        if number is None or number == self.number:
             return False
-        handle = _locked(self._path(int(number)))
+        handle = _locked(self._path(number))
         if handle is not None:
             os.close(handle)
         return handle is not None
 
     def is_alone(self) -> bool:
         """Whether no other process works on this database."""
-        others = (int(path.stem.removeprefix("slot-")) for path in self._folder.glob("slot-*.lock"))
-        return all(self.is_free(f"slot-{number}") for number in others if number != self.number)
+        others = {path.stem for path in self._folder.glob("slot-*.lock")} - {self.name}
+        return all(self.is_free(name) for name in others)
 
     def _first_free(self) -> tuple[int, int]:
         for number in range(SLOTS):
@@ -63,7 +65,7 @@ class Slot:
         raise SlotsTakenError(f"At most {SLOTS} processes may work on one database.")
 
     def _path(self, number: int) -> Path:
-        return self._folder / f"slot-{number}.lock"
+        return self._folder / f"{slot_name(number)}.lock"
 
 
 def _locked(path: Path) -> int | None:

@@ -1,8 +1,8 @@
 """DBOS Transact: the one module that knows it.
 
-It keeps its records in a file of its own beside the database (docs/adr/0017-jobs.md). One workflow is one run of a job;
-its arguments are JSON, its output is nothing, and all that matters is in our own tables: were its file lost, every
-unfinished job would be brought to it again.
+It keeps its records in a file of its own beside an SQLite database, in a schema of its own on PostgreSQL
+(docs/adr/0017-jobs.md). One workflow is one run of a job; its arguments are JSON, its output is nothing, and all that
+matters is in our own tables: were its records lost, every unfinished job would be brought to it again.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import sqlite3
 from collections.abc import Callable, Iterable
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 from dbos import DBOS, DBOSConfig, SetEnqueueOptions, SetWorkflowID, WorkflowSerializationFormat
+from sqlalchemy.engine import URL
 
 Runner = Callable[[str, int], None]
 
@@ -24,6 +24,8 @@ QUEUE = "jobs"
 ACTIVE = frozenset({"ENQUEUED", "DELAYED", "PENDING"})
 ENDED = ["SUCCESS", "ERROR", "CANCELLED", "MAX_RECOVERY_ATTEMPTS_EXCEEDED"]
 POLL_S = 0.5
+POOL = 5
+"""Connections to its records: for a queue, its notices and a run or two."""
 KEEP = timedelta(days=1)
 _AT_ONCE = 500
 
@@ -46,15 +48,17 @@ def _run(job: str, run: int) -> None:
 class Transact:
     """The engine of this process, from its launch to its close."""
 
-    def __init__(self, file: Path, executor: str, runner: Runner, *, at_once: int) -> None:
+    def __init__(self, records: URL, executor: str, runner: Runner, *, at_once: int) -> None:
         """Launch it; the runs that a process of the same name left behind are taken up at once."""
-        _open(file)
+        if records.get_backend_name() == "sqlite":
+            _open(records)
         # With a handler, DBOS adds none of its own and its lines come out as ours do.
         logging.getLogger("dbos").addHandler(logging.NullHandler())
         _runner[:] = [runner]
         config: DBOSConfig = {
             "name": "headimpact",
-            "system_database_url": f"sqlite:///{file}",
+            "system_database_url": records.render_as_string(hide_password=False),
+            "sys_db_pool_size": POOL,
             "application_version": VERSION,
             "executor_id": executor,
             "log_level": "WARNING",
@@ -105,7 +109,7 @@ def _id(job: str, run: int) -> str:
     return f"{job}.{run}"
 
 
-def _open(file: Path) -> None:
+def _open(records: URL) -> None:
     """Readers and writers of the file do not block each other; DBOS leaves a new file in the mode where they do."""
-    with closing(sqlite3.connect(file)) as driver:
+    with closing(sqlite3.connect(records.database or "")) as driver:
         driver.execute("PRAGMA journal_mode = WAL")

@@ -10,7 +10,7 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from alembic.util import CommandError
-from sqlalchemy import Connection, Engine, text
+from sqlalchemy import Connection, Engine
 
 import headimpact_service
 
@@ -41,7 +41,6 @@ def upgrade(engine: Engine, revision: str = "head") -> None:
     config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
     with _ONE_AT_A_TIME, engine.begin() as conn:
-        _lock(conn)
         _refuse_newer(conn, ScriptDirectory.from_config(config))
         config.attributes["connection"] = conn
         command.upgrade(config, revision)
@@ -51,12 +50,6 @@ def upgrade(engine: Engine, revision: str = "head") -> None:
 def current_revision(conn: Connection) -> str | None:
     """The revision of a database, None if it has no tables of ours."""
     return MigrationContext.configure(conn).get_current_revision()
-
-
-def _lock(conn: Connection) -> None:
-    """Exclude other processes; on SQLite the transaction itself already does."""
-    if conn.dialect.name == "postgresql":
-        conn.execute(text("SELECT pg_advisory_xact_lock(4711049)"))
 
 
 def _refuse_newer(conn: Connection, scripts: ScriptDirectory) -> None:

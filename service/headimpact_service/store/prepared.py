@@ -8,8 +8,9 @@ write itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 from weakref import WeakKeyDictionary
 
 from sqlalchemy import Connection, LargeBinary, Select
@@ -20,7 +21,8 @@ from sqlalchemy.sql.dml import Insert
 _Convert = Callable[[Any], Any]
 
 
-class _Plan(NamedTuple):
+@dataclass(slots=True)
+class _Plan:
     """What a statement is for one dialect: its text, its parameters in order, and what converts some of them."""
 
     sql: str
@@ -29,7 +31,8 @@ class _Plan(NamedTuple):
     binds: tuple[tuple[int, _Convert], ...]
     positional: bool
     defaults: dict[str, Any]
-    results: tuple[tuple[int, _Convert], ...]
+    results: tuple[tuple[int, _Convert], ...] | None = None
+    """What converts some columns of a row; known with the first, as it depends on what the driver calls their types."""
 
 
 class Prepared:
@@ -49,6 +52,8 @@ class Prepared:
         """The first row of a query with each value as its column's type has it, or None."""
         plan = self._plan(conn.dialect)
         cursor = self._execute(conn, plan, values)
+        if plan.results is None:
+            plan.results = self._results(conn.dialect, [column[1] for column in cursor.description])
         row = cursor.fetchone()
         cursor.close()
         if row is None:
@@ -98,15 +103,13 @@ class Prepared:
             binds=tuple((at, bind) for at, bind in enumerate(binds) if bind is not None),
             positional=compiled.positional,
             defaults={name: value for name, value in compiled.params.items() if value is not None},
-            results=self._results(dialect),
         )
 
-    def _results(self, dialect: Dialect) -> tuple[tuple[int, _Convert], ...]:
+    def _results(self, dialect: Dialect, codes: list[Any]) -> tuple[tuple[int, _Convert], ...]:
         """The converters of a query's columns that need one."""
-        if not isinstance(self._statement, Select):
-            return ()
+        assert isinstance(self._statement, Select)
         types = [column.type.dialect_impl(dialect) for column in self._statement.selected_columns]
-        converters = [kind.result_processor(dialect, None) for kind in types]
+        converters = [kind.result_processor(dialect, code) for kind, code in zip(types, codes, strict=True)]
         return tuple((at, convert) for at, convert in enumerate(converters) if convert is not None)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy.exc import DatabaseError, OperationalError
+from sqlalchemy.exc import DatabaseError, DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from headimpact_service.errors import Problem
@@ -16,8 +16,9 @@ def unavailable(detail: str) -> Problem:
 
 
 def is_out_of_reach(error: BaseException) -> bool:
-    """Whether an error is the database's own: locked, full, unreadable, damaged; not a mistake in what it was asked.
+    """Whether an error is the database's own: locked, full, gone, damaged; not a mistake in what it was asked.
 
     The driver names a damaged file by the class that all of its errors have in common.
     """
-    return isinstance(error, OperationalError | PoolTimeout) or type(error) is DatabaseError
+    lost = isinstance(error, DBAPIError) and error.connection_invalidated
+    return lost or isinstance(error, OperationalError | PoolTimeout) or type(error) is DatabaseError

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
-from sqlalchemy import Connection, Engine
+from sqlalchemy import Connection, Engine, RootTransaction
+from sqlalchemy.exc import DBAPIError
 
 from headimpact_service.errors import Problem
 from headimpact_service.store.unavailable import is_out_of_reach, unavailable
@@ -106,8 +107,7 @@ class Writer:
             group, closing = self._collect(first)
             self._write_group(group)
             _answer(group)
-        if self._conn is not None:
-            self._conn.close()
+        self._leave()
 
     def _collect(self, first: _Write) -> tuple[list[_Write], bool]:
         """The writes that share the next commit, and whether the queue was closed behind them."""
@@ -135,8 +135,8 @@ class Writer:
         False means that one of several failed after writing: everything is rolled back and nothing is answered yet.
         """
         try:
-            conn = self._connection()
-            with conn.begin():
+            conn, transaction = self._begin()
+            with transaction:
                 for write in group:
                     _run(write, conn, alone=len(group) == 1)
         except _GroupError:
@@ -145,11 +145,29 @@ class Writer:
             return _blame(group, error)
         return True
 
+    def _begin(self) -> tuple[Connection, RootTransaction]:
+        """A transaction on the thread's own connection; on a new one if the server has closed that meanwhile."""
+        try:
+            conn = self._connection()
+            return conn, conn.begin()
+        except DBAPIError as error:
+            if not error.connection_invalidated:
+                raise
+        self._leave()
+        conn = self._connection()
+        return conn, conn.begin()
+
     def _connection(self) -> Connection:
         """The thread's own connection, kept: taking one from the pool costs a tenth of a write."""
         if self._conn is None:
             self._conn = self._engine.connect()
         return self._conn
+
+    def _leave(self) -> None:
+        """Close the connection; the next write opens another."""
+        if self._conn is not None:
+            self._conn.close()
+            self._conn = None
 
 
 class _GroupError(Exception):

@@ -30,6 +30,7 @@ def listed(database: Database, data_set: bytes, filters: ImpactFilters | None = 
 
 
 class TestErase:
+    @pytest.mark.backend("sqlite")
     def test_an_erased_athlete_leaves_nothing_in_the_file(self, database, data_set, make_impact, tmp_path) -> None:
         marked = make_impact("secret-content", external_id="secret-impact", athlete_external_id="secret-athlete")
         marked = replace(marked, session_id="secret-session", device_serial="mg-1")

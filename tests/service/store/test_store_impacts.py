@@ -368,6 +368,7 @@ class TestScores:
         assert listed(database, data_set) == []
 
 
+@pytest.mark.backend("sqlite")
 def test_the_figures_for_the_planner_lead_to_the_indices(database, data_set) -> None:
     """Each lookup of the hot path and of an athlete's list is a search, never a walk through a data set."""
     with database.read() as conn:

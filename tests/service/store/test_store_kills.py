@@ -32,8 +32,9 @@ def assert_all_stored(url: str, data_set: bytes, answered: dict[str, bytes]) -> 
         for external_id, impact_id in answered.items():
             assert impacts.get(conn, data_set, impact_id).external_id == external_id
             assert impacts.trace(conn, data_set, impact_id).signals == external_id.encode() * 100
-        assert conn.exec_driver_sql("PRAGMA integrity_check").scalar() == "ok"
-        assert conn.exec_driver_sql("PRAGMA foreign_key_check").first() is None
+        if database.is_file:
+            assert conn.exec_driver_sql("PRAGMA integrity_check").scalar() == "ok"
+            assert conn.exec_driver_sql("PRAGMA foreign_key_check").first() is None
     database.close()
 
 

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import sqlite3
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
-from sqlalchemy import Connection, text
+from sqlalchemy import Connection, create_engine, text
 from sqlalchemy.exc import OperationalError
 
 from headimpact_service.errors import Problem
 from headimpact_service.store import organisations
 from headimpact_service.store.database import Database
+from headimpact_service.store.postgresql import WRITE_LOCK
 
 
 def names(database: Database) -> list[str]:
@@ -93,6 +92,7 @@ class TestWriter:
         assert isinstance(outcomes[1], Problem)
         assert names(database) == ["before", "after"]
 
+    @pytest.mark.backend("sqlite")  # the driver says there whether anything was written
     def test_a_problem_before_any_write_is_only_answered(self, database: Database) -> None:
         runs = []
 
@@ -209,12 +209,14 @@ class TestWriter:
 
 class TestLocks:
     @pytest.fixture
-    def locked(self, database: Database, tmp_path: Path):
+    def locked(self, database_url: str):
         """Another process's write transaction."""
-        other = sqlite3.connect(tmp_path / "headimpact.db", isolation_level=None)
-        other.execute("BEGIN IMMEDIATE")
-        yield other
-        other.close()
+        other = create_engine(Database(database_url).url)
+        sqlite = other.dialect.name == "sqlite"
+        with other.connect() as conn:
+            conn.exec_driver_sql("BEGIN IMMEDIATE" if sqlite else f"SELECT pg_advisory_xact_lock({WRITE_LOCK})")
+            yield conn
+        other.dispose()
 
     def test_a_lock_beyond_the_busy_timeout_is_unavailable(self, locked, database_url: str) -> None:
         database = Database(database_url, busy_timeout_s=0.01)
@@ -222,7 +224,7 @@ class TestLocks:
             database.write(store("x"))
         assert (caught.value.slug, caught.value.headers) == ("unavailable", {"Retry-After": "2"})
         assert isinstance(caught.value.__cause__, OperationalError)
-        locked.execute("ROLLBACK")
+        locked.rollback()
         database.write(store("y"))
         assert names(database) == ["y"]
         database.close()
@@ -247,6 +249,7 @@ class TestLocks:
         assert caught.value.slug == "unavailable"
         database.close()
 
+    @pytest.mark.backend("sqlite")
     def test_a_full_disk_is_unavailable_and_stores_nothing(self, database: Database) -> None:
         def fill(conn: Connection) -> None:
             pages = conn.exec_driver_sql("PRAGMA page_count").scalar()
