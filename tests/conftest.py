@@ -58,8 +58,11 @@ def postgresql_server() -> Iterator[postgres.Server]:
 
 
 @pytest.fixture
-def database_url(backend: str, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[str]:
+def database_url(
+    backend: str, tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[str]:
     """The URL of a database of the test's own, at this version's schema."""
+    monkeypatch.setenv("HEADIMPACT_UPLOAD_FOLDER", str(tmp_path / "uploads"))  # a server has no folder beside it
     if backend == "postgresql":
         server: postgres.Server = request.getfixturevalue("postgresql_server")
         with server.emptied() as url:

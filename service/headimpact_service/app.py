@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 
 from anyio.to_thread import run_sync
 from fastapi import FastAPI
@@ -11,6 +12,7 @@ from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.routing import BaseRoute
 
 from headimpact_service import deps, openapi
 from headimpact_service.answers import problem_answer
@@ -66,7 +68,7 @@ def create_app(configured: Settings, database: Database, engine: deps.JobEngine 
     """The application on a migrated database; it runs the engine, and closes both when the server stops it."""
     app = FastAPI(
         openapi_url=None,  # the document and its page are operations like the others: pages/docs.py
-        routes=openapi.routes(OPERATIONS),
+        routes=list(_routes()),
         middleware=[Middleware(Edge, access_log=configured.access_log)],
         exception_handlers={Problem: _problem, HTTPException: _http_exception},
         lifespan=_lifespan,
@@ -74,8 +76,19 @@ def create_app(configured: Settings, database: Database, engine: deps.JobEngine 
     app.router.redirect_slashes = False  # /v1/impacts/ is another path, and nothing is there
     deps.set_up(app, configured, database, engine)
     app.state.facts = Facts()
-    app.state.openapi = openapi.as_text(openapi.document(OPERATIONS)).encode()
+    app.state.openapi = _document()
     return app
+
+
+@cache
+def _routes() -> tuple[BaseRoute, ...]:
+    """The same for every application of a process, as is what describes them: to make either costs half a second."""
+    return tuple(openapi.routes(OPERATIONS))
+
+
+@cache
+def _document() -> bytes:
+    return openapi.as_text(openapi.document(OPERATIONS)).encode()
 
 
 @asynccontextmanager

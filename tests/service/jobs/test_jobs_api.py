@@ -27,7 +27,7 @@ def order(api: Api, data: bytes = LINE, *, headers: dict[str, str] | None = None
 
 
 def uploads(tmp_path: Path) -> list[str]:
-    folder = tmp_path / "headimpact.db-jobs" / "uploads"
+    folder = tmp_path / "uploads"
     return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
 
 
@@ -40,7 +40,7 @@ class TestOrder:
         assert (job["kind"], job["state"], job["progress"]) == ("import", "queued", {"done": 0, "total": None})
         assert api.get(answer.headers["location"]).json() == job
         assert uploads(tmp_path) == [job["id"]]
-        assert (tmp_path / "headimpact.db-jobs" / "uploads" / job["id"]).read_bytes() == LINE
+        assert (tmp_path / "uploads" / job["id"]).read_bytes() == LINE
 
     def test_more_than_a_thousand_impacts_are_a_job(self, api: Api) -> None:
         line = b"{}\n"
@@ -55,7 +55,7 @@ class TestOrder:
         form = api.post("/v1/imports", files={"file": ("a.csv", large, "text/csv")}, data={"athlete": "p-1"})
         for answer in (raw, small, form):
             assert answer.status_code == 202, answer.text
-            file = tmp_path / "headimpact.db-jobs" / "uploads" / answer.json()["id"]
+            file = tmp_path / "uploads" / answer.json()["id"]
             assert file.read_bytes() == large
 
     def test_an_upload_beyond_the_bound_is_413_sent_or_inflated_and_leaves_nothing(

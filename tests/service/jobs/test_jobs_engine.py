@@ -58,6 +58,7 @@ def ended(house: House, job: Job) -> Job:
     raise TimeoutError(found)
 
 
+@pytest.mark.backend("sqlite")
 def test_nothing_is_launched_before_there_is_a_job(start: Start, kind: Counting, tmp_path: Path) -> None:
     start().stop()
     assert [path.name for path in (tmp_path / "engine").iterdir()] == ["slot-0.lock"]

@@ -30,12 +30,19 @@ class TestHealth:
         assert api.get("/livez", key=None).json() == {"status": "ok"}
         assert api.get("/readyz", key=None).json()["status"] == "ok"
 
+    @pytest.mark.backend("sqlite")
     def test_an_old_sqlite_is_a_warning_and_stays_200(self, api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("sqlite3.sqlite_version_info", (3, 40, 1))
         answer = api.get("/readyz")
         assert (answer.status_code, len(answer.json()["warnings"])) == (200, 1)
         monkeypatch.setattr("sqlite3.sqlite_version_info", (3, 51, 3))
         assert api.get("/readyz").json()["warnings"] == []
+
+    @pytest.mark.backend("postgresql")
+    def test_a_server_that_does_not_wait_for_its_disk_is_warned_of(self, api: Api) -> None:
+        answer = api.get("/readyz")
+        assert answer.status_code == 200
+        assert any("fsync" in warning for warning in answer.json()["warnings"])
 
 
 class TestPages:
