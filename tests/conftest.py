@@ -24,7 +24,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run what needs a database on each kind, unless the marker `backend` names those that it is about."""
     if "backend" in metafunc.fixturenames:
         marker = metafunc.definition.get_closest_marker("backend")
-        metafunc.parametrize("backend", BACKENDS if marker is None else marker.args)
+        metafunc.parametrize("backend", BACKENDS if marker is None else marker.args, scope="module")
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:

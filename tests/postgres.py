@@ -56,6 +56,7 @@ class Server:
         self._url = url
         self._prefix = f"headimpact_{uuid4().hex[:12]}"
         self._numbers = itertools.count(1)
+        self._made: set[str] = set()
         self._used: str | None = None
         self._template = self.create()
         database = Database(self._template)
@@ -67,11 +68,14 @@ class Server:
         name = f"{self._prefix}_{next(self._numbers)}"
         template = f" TEMPLATE {make_url(self._template).database}" if migrated else ""
         self._run(f"CREATE DATABASE {name}{template}")
-        return self._url.set(database=name).render_as_string(hide_password=False)
+        url = self._url.set(database=name).render_as_string(hide_password=False)
+        self._made.add(url)
+        return url
 
     def drop(self, url: str) -> None:
         """Delete a database, whoever is still connected to it."""
         self._run(f"DROP DATABASE IF EXISTS {make_url(url).database} WITH (FORCE)")
+        self._made.discard(url)
 
     @contextmanager
     def emptied(self) -> Iterator[str]:
@@ -88,8 +92,8 @@ class Server:
             self._used = None
 
     def close(self) -> None:
-        """Delete the databases that were kept."""
-        for url in filter(None, (self._template, self._used)):
+        """Delete every database that is still there."""
+        for url in tuple(self._made):
             self.drop(url)
 
     def _run(self, statement: str) -> None:

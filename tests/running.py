@@ -11,8 +11,12 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import httpx
+from sqlalchemy import NullPool, create_engine, text
+
+from headimpact_service.store.database import Database
 
 START_S = 60.0
 
@@ -89,6 +93,18 @@ class Service:
         self.reader.join(START_S)
         self.log.close()
         return code
+
+
+def on(url: str, folder: Path) -> dict[str, str]:
+    """The environment of a service on this database, its uploads in this folder."""
+    return {"HEADIMPACT_DATABASE_URL": url, "HEADIMPACT_UPLOAD_FOLDER": str(folder / "uploads")}
+
+
+def rows(url: str, query: str) -> list[tuple[Any, ...]]:
+    """What a query finds, read beside the service."""
+    engine = create_engine(Database(url).url, poolclass=NullPool)
+    with engine.connect() as conn:
+        return [tuple(row) for row in conn.execute(text(query))]
 
 
 def until(condition: threading.Event, seconds: float = START_S) -> None:

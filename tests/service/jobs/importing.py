@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import signal
-import sqlite3
 import time
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from running import Service
+from running import Service, on, rows
 from sending import half_sine
 
 PATIENCE_S = 120.0
@@ -36,12 +34,16 @@ def ndjson(count: int, prefix: str = "e") -> bytes:
 class Importer:
     """The service, its key, and the one job that it does."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.service = Service(folder)
+    def __init__(self, folder: Path, url: str) -> None:
+        self.folder, self.url = folder, url
+        self.service = self.start()
         self.key = self.service.key
         self.job = ""
         self.seen = [0]
+
+    def start(self) -> Service:
+        """Another process on the same database."""
+        return Service(self.folder, on(self.url, self.folder))
 
     def order(self, data: bytes, **headers: str) -> dict[str, Any]:
         """Send the file; the job."""
@@ -81,22 +83,22 @@ class Importer:
             self.service.kill()
         else:
             assert self.service.stop() in {0, -signal.SIGTERM}
-        self.service = Service(self.folder)
+        self.service = self.start()
 
     def stored(self, prefix: str = "e") -> list[str]:
-        """The names of the impacts that begin so; and the file is whole."""
-        with closing(sqlite3.connect(self.folder / "headimpact.db")) as file:
-            assert file.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-            assert file.execute("PRAGMA foreign_key_check").fetchone() is None
-            assert file.execute("SELECT count(*) FROM job_chunks").fetchone() == (0,)
-            impacts = [name for (name,) in file.execute("SELECT external_id FROM impacts ORDER BY id")]
-            assert file.execute("SELECT count(*) FROM impact_revisions").fetchone() == (len(impacts),)
-            assert file.execute("SELECT count(*) FROM scores").fetchone() == (len(impacts),)
+        """The names of the impacts that begin so; and the tables agree."""
+        if self.url.startswith("sqlite"):
+            assert rows(self.url, "PRAGMA integrity_check") == [("ok",)]
+            assert rows(self.url, "PRAGMA foreign_key_check") == []
+        assert rows(self.url, "SELECT count(*) FROM job_chunks") == [(0,)]
+        impacts = [name for (name,) in rows(self.url, "SELECT external_id FROM impacts ORDER BY id")]
+        for table in ("impact_revisions", "scores"):
+            assert rows(self.url, f"SELECT count(*) FROM {table}") == [(len(impacts),)]
         return [name for name in impacts if name.startswith(f"{prefix}-")]
 
     def uploads(self) -> list[str]:
         """What lies in the folder of uploads, once a job that has just ended had its moment to clean up."""
-        folder = self.folder / "headimpact.db-jobs" / "uploads"
+        folder = self.folder / "uploads"
         deadline = time.monotonic() + PATIENCE_S
         while (names := [path.name for path in folder.iterdir()]) and time.monotonic() < deadline:
             time.sleep(0.05)

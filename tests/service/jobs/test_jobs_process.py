@@ -9,24 +9,29 @@ from random import Random
 
 import pytest
 from importing import Importer, ndjson
-from running import Service
 
 COUNT = 5000
 
 
 @pytest.fixture
-def importer(tmp_path: Path) -> Iterator[Importer]:
+def importer(empty_url: str, tmp_path: Path) -> Iterator[Importer]:
     """A service of the test's own, to be killed."""
-    importer = Importer(tmp_path)
+    importer = Importer(tmp_path, empty_url)
     yield importer
     if importer.service.process.poll() is None:
         importer.service.stop()
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Importer]:
+def served(
+    backend: str, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
+) -> Iterator[Importer]:
     """One service for all that leave it alive."""
-    served = Importer(tmp_path_factory.mktemp("served"))
+    folder = tmp_path_factory.mktemp("served")
+    url = f"sqlite:///{folder}/headimpact.db"
+    if backend == "postgresql":
+        url = request.getfixturevalue("postgresql_server").create()
+    served = Importer(folder, url)
     yield served
     served.service.stop()
 
@@ -47,7 +52,7 @@ def test_an_import_that_is_killed_at_several_moments_stores_every_impact_once(im
     made = importer.order(data, **{"Idempotency-Key": "k-1"})
     assert made["state"] == "queued"
     for orphan in ("0123456789abcdef.part", "job_01m83javvted48sxhg2mzndhsa"):
-        (importer.folder / "headimpact.db-jobs" / "uploads" / orphan).write_bytes(b"x")
+        (importer.folder / "uploads" / orphan).write_bytes(b"x")
     importer.again(kill=True)  # before anybody has taken it up
     importer.until(lambda job: job["progress"]["done"] >= 500)
     importer.again(kill=True)  # in its midst
@@ -112,7 +117,7 @@ def test_another_process_takes_over_from_a_dead_one(importer: Importer) -> None:
     """Prints how long it took, for docs/campaigns.md."""
     importer.order(ndjson(20_000))
     importer.until(lambda job: job["progress"]["done"] >= 500)
-    other = Service(importer.folder)
+    other = importer.start()
     importer.service.kill()
     importer.service, died = other, time.monotonic()
     before = importer.look()

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import random
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 from cohorts import fill, spring_document
-from running import Service
+from running import Service, on, rows
 
 from headimpact_service.store import keys
 from headimpact_service.store.database import Database
@@ -28,15 +26,8 @@ ENDED = {"succeeded", "failed", "cancelled"}
 class Worker:
     """`headimpact work` on the service's database."""
 
-    def __init__(self, folder: Path) -> None:
-        command = [
-            sys.executable,
-            "-m",
-            "headimpact_service",
-            "work",
-            "--database-url",
-            f"sqlite:///{folder}/headimpact.db",
-        ]
+    def __init__(self, folder: Path, url: str) -> None:
+        command = [sys.executable, "-m", "headimpact_service", "work", "--database-url", url]
         self._process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == b"Working.\n"
@@ -58,11 +49,11 @@ class Worker:
 class House:
     """A service with labelled impacts and a registered model; it and a worker are killed as a test wants it."""
 
-    def __init__(self, folder: Path, impacts: int) -> None:
-        self.folder = folder
-        self.service = Service(folder)
+    def __init__(self, folder: Path, url: str, impacts: int) -> None:
+        self.folder, self.url = folder, url
+        self.service = self.start()
         self.key = self.service.key
-        database = Database(f"sqlite:///{folder / 'headimpact.db'}")
+        database = Database(url)
         with database.read() as conn:
             found = keys.find_key(conn, self.key)
         assert found is not None
@@ -70,6 +61,9 @@ class House:
             fill(database, found.data_set_id, min(1000, impacts - first), seed=first + 1, first=first)
         database.close()
         self.post("/v1/models", spring_document())
+
+    def start(self) -> Service:
+        return Service(self.folder, on(self.url, self.folder))
 
     def post(self, path: str, body: dict[str, Any]) -> dict[str, Any]:
         with self.service.client(self.key) as client:
@@ -83,7 +77,7 @@ class House:
 
     def restart(self) -> None:
         self.service.kill()
-        self.service = Service(self.folder)
+        self.service = self.start()
 
     def ended(self, job: str) -> dict[str, Any]:
         deadline = time.monotonic() + PATIENCE_S
@@ -92,13 +86,12 @@ class House:
         return found
 
     def rows(self, query: str) -> list[tuple[Any, ...]]:
-        with closing(sqlite3.connect(self.folder / "headimpact.db")) as driver:
-            return driver.execute(query).fetchall()
+        return rows(self.url, query)
 
 
 @pytest.fixture
-def house(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[House]:
-    made = House(tmp_path, request.param)
+def house(empty_url: str, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[House]:
+    made = House(tmp_path, empty_url, request.param)
     yield made
     made.service.stop()
 
@@ -129,13 +122,13 @@ def test_a_re_score_and_a_fit_survive_a_kill_of_the_service(house: House) -> Non
 @pytest.mark.parametrize("house", [20_000], indirect=True)
 def test_twenty_kills_of_service_and_worker_in_a_re_score_of_20_000(house: House) -> None:
     chance = random.Random(1)
-    worker = Worker(house.folder)
+    worker = Worker(house.folder, house.url)
     job = house.post("/v1/models/spring/scores", {})["id"]
     for number in range(20):
         time.sleep(chance.uniform(0.2, 3.0))
         if number % 2:
             worker.kill()
-            worker = Worker(house.folder)
+            worker = Worker(house.folder, house.url)
         else:
             house.restart()
     check_rescored(house, house.ended(job), 20_000)
@@ -146,7 +139,7 @@ def test_twenty_kills_of_service_and_worker_in_a_re_score_of_20_000(house: House
 @pytest.mark.parametrize("house", [2_000], indirect=True)
 def test_twenty_kills_of_service_and_worker_in_fits(house: House) -> None:
     chance = random.Random(2)
-    worker = Worker(house.folder)
+    worker = Worker(house.folder, house.url)
     names = []
     for number in range(20):
         name = f"fit-{number}"
@@ -154,24 +147,22 @@ def test_twenty_kills_of_service_and_worker_in_fits(house: House) -> None:
         time.sleep(chance.uniform(0.2, 6.0))
         if number % 2:
             worker.kill()
-            worker = Worker(house.folder)
+            worker = Worker(house.folder, house.url)
         else:
             house.restart()
     found = [house.ended(job) for job in names]
     assert [job["state"] for job in found] == ["succeeded"] * 20
     assert [job["result"]["version"] for job in found] == [f"fit-{number}" for number in range(20)]
-    documents = house.rows(
-        "SELECT json_remove(document, '$.version', '$.title') FROM models WHERE version LIKE 'fit-%'"
-    )
-    assert len(documents) == 20
-    assert len(set(documents)) == 1
+    with house.service.client(house.key) as client:
+        documents = [client.get(f"/v1/models/fit-{number}").json()["criteria"] for number in range(20)]
+    assert all(document == documents[0] for document in documents)
     assert worker.stop() == 0
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("house", [300], indirect=True)
 def test_two_processes_fire_one_schedule_once(house: House) -> None:
-    worker = Worker(house.folder)
+    worker = Worker(house.folder, house.url)
     schedule = {"cron": "* * * * *", "fit": {"criteria": ["bam"], "replicas": 10}}
     with house.service.client(house.key) as client:
         assert client.put("/v1/schedules/often", json=schedule).status_code == 201
