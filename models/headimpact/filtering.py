@@ -15,7 +15,6 @@ from math import atan, pi, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from headimpact.published import FILTERS
 
@@ -79,6 +78,8 @@ def low_pass(x: FloatArray, corner_hz: float, sample_rate_hz: float) -> FloatArr
     sample_rate_hz
         Samples per second [Hz].
     """
+    from scipy import signal  # its import costs more than all else here: only who filters waits for it
+
     b, a, zi = _design(corner_hz, sample_rate_hz)
     margin = min(9, x.shape[-1] - 1)
     extended = _odd_extension(x, margin)
@@ -90,6 +91,8 @@ def low_pass(x: FloatArray, corner_hz: float, sample_rate_hz: float) -> FloatArr
 
 @lru_cache(maxsize=256)
 def _design(corner_hz: float, sample_rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    from scipy import signal
+
     b, a = signal.butter(2, corner_hz, fs=sample_rate_hz)
     return b, a, signal.lfilter_zi(b, a)
 
