@@ -20,11 +20,16 @@ from headimpact_service.store.database import Database
 BACKENDS = ("sqlite", "postgresql")
 
 
+ON_EACH = {"store", "jobs", "routes", "contract"}
+"""The folders whose tests are about what is stored and answered; reading files is the same whatever it is stored in."""
+
+
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run what needs a database on each kind, unless the marker `backend` names those that it is about."""
     if "backend" in metafunc.fixturenames:
         marker = metafunc.definition.get_closest_marker("backend")
-        metafunc.parametrize("backend", BACKENDS if marker is None else marker.args, scope="module")
+        usual = BACKENDS if metafunc.definition.path.parent.name in ON_EACH else BACKENDS[:1]
+        metafunc.parametrize("backend", usual if marker is None else marker.args, scope="module")
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:

@@ -50,7 +50,8 @@ For research use. The published model rests on adult men; it is no diagnosis.
 
 Every answer carries `X-Request-Id`, the request's own if it sent a usable one. Every error is a problem document
 (RFC 9457) whose `type` is a page of this service; `/problems` lists them. A path answers a method that it does not take
-with 405 and all that it takes in `Allow`. Request bodies may be gzip (`Content-Encoding: gzip`).
+with 405 and all that it takes in `Allow`; HEAD is answered as GET is, without the body. Request bodies may be gzip
+(`Content-Encoding: gzip`).
 """
 
 
@@ -85,10 +86,17 @@ class StrictRoute(APIRoute):
 
 
 def routes(operations: Sequence[Operation]) -> list[BaseRoute]:
-    """The routes of all operations; after those of each path one for every other method."""
+    """The routes of all operations; after those of each path one for every other method.
+
+    What is read with GET answers HEAD with the same headers; the server leaves the body out.
+    """
     found: list[BaseRoute] = []
     for path, same_path in by_path(operations).items():
-        found += [StrictRoute(operation) for operation in same_path]
+        for operation in same_path:
+            route = StrictRoute(operation)
+            if operation.method == "GET":
+                route.methods = {"GET", "HEAD"}
+            found.append(route)
         found.append(Route(path, OtherMethods(same_path), include_in_schema=False))
     return found
 
@@ -99,7 +107,7 @@ def document(operations: Sequence[Operation]) -> dict[str, Any]:
         title="Headimpact",
         version=__version__,
         description=_ABOUT,
-        routes=routes(operations),
+        routes=[StrictRoute(operation) for operation in operations],
         servers=[{"url": "/"}],
         tags=[{"name": tag} for tag in dict.fromkeys(o.tag for o in operations if o.documented)],
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},

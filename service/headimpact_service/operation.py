@@ -192,7 +192,8 @@ class OtherMethods:
 
     def __init__(self, operations: Sequence[Operation]) -> None:
         """All `operations` share one path."""
-        self.allowed = ", ".join(sorted(operation.method for operation in operations))
+        taken = {operation.method for operation in operations}
+        self.allowed = ", ".join(sorted(taken | ({"HEAD"} if "GET" in taken else set())))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002 - ASGI's signature
         """Refuse one request."""

@@ -212,11 +212,11 @@ class TestMethods:
         ("path", "allowed"),
         [
             ("/v1/score", {"POST"}),
-            ("/v1/impacts", {"GET", "POST"}),
-            ("/v1/impacts/imp_x", {"GET", "PUT", "DELETE"}),
-            ("/v1/athletes/ath_x", {"GET", "PATCH", "DELETE"}),
-            ("/v1/devices/mg-1", {"GET", "PUT"}),
-            ("/livez", {"GET"}),
+            ("/v1/impacts", {"GET", "HEAD", "POST"}),
+            ("/v1/impacts/imp_x", {"GET", "HEAD", "PUT", "DELETE"}),
+            ("/v1/athletes/ath_x", {"GET", "HEAD", "PATCH", "DELETE"}),
+            ("/v1/devices/mg-1", {"GET", "HEAD", "PUT"}),
+            ("/livez", {"GET", "HEAD"}),
         ],
     )
     def test_a_405_names_every_method_that_the_path_takes(self, api: Api, path: str, allowed: set[str]) -> None:

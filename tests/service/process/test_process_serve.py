@@ -35,6 +35,14 @@ def impatient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     running.stop()
 
 
+def test_head_is_answered_as_get_is_without_the_body(impatient: Service) -> None:
+    with impatient.client(impatient.key) as client:
+        for path in ("/livez", "/v1/impacts", "/openapi.json"):
+            got, head = client.get(path), client.head(path)
+            assert (head.status_code, head.content) == (200, b"")
+            assert head.headers["content-type"] == got.headers["content-type"]
+
+
 class TestFirstStart:
     def test_the_printed_example_works_when_pasted_in_any_folder(self, service: Service, tmp_path: Path) -> None:
         found = re.search(r"^curl .*$", service.printed, re.MULTILINE)

@@ -11,12 +11,14 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
+import psycopg
 import pytest
+from postgres import plain
 from sqlalchemy import Connection, bindparam, create_engine, insert, literal, select, text
 from sqlalchemy.exc import IntegrityError, InternalError, ProgrammingError
 
 from headimpact_service.errors import Problem
-from headimpact_service.store import impacts, organisations, paging, sqlite
+from headimpact_service.store import impacts, organisations, paging, postgresql, sqlite
 from headimpact_service.store.columns import Instant
 from headimpact_service.store.database import Database, DatabaseUrlError
 from headimpact_service.store.prepared import Prepared
@@ -45,6 +47,19 @@ class TestUrl:
     def test_another_engine_is_refused(self) -> None:
         with pytest.raises(DatabaseUrlError, match="SQLite"):
             Database("mysql://localhost/x")
+
+    @pytest.mark.parametrize(
+        ("url", "said"), [("postgresql+psycopg2://h/x", "psycopg"), ("postgresql://h", "names no database")]
+    )
+    def test_a_server_s_url_that_cannot_be_used_is_refused(self, url: str, said: str) -> None:
+        with pytest.raises(DatabaseUrlError, match=said):
+            Database(url)
+
+    @pytest.mark.parametrize("scheme", ["postgres", "postgresql", "postgresql+psycopg"])
+    def test_a_server_has_the_url_that_its_hosts_give(self, scheme: str) -> None:
+        database = Database(f"{scheme}://me:secret@host/x")
+        assert str(database.url) == "postgresql+psycopg://me:***@host/x"
+        assert not database.is_file
 
     def test_the_folder_of_the_file_is_made(self, tmp_path: Path) -> None:
         database = Database(f"sqlite:///{tmp_path / 'new' / 'folder' / 'x.db'}")
@@ -126,6 +141,55 @@ class TestChecks:
         monkeypatch.setattr(sqlite.sqlite3, "sqlite_version_info", version)
         assert len(database.warnings()) == warnings
         assert all("3.51.3" in warning for warning in database.warnings())
+
+    @pytest.mark.backend("postgresql")
+    def test_a_server_older_than_what_is_tried_is_warned_of(self, database: Database, monkeypatch) -> None:
+        monkeypatch.setattr(postgresql, "OLDEST", 99)
+        assert "older than 99" in database.warnings()[0]
+
+
+@pytest.mark.backend("postgresql")
+class TestServer:
+    """A server that goes away and comes back."""
+
+    END_OTHERS = "SELECT pg_terminate_backend(pid, 10000) FROM pg_stat_activity WHERE application_name = 'headimpact'"
+
+    def test_connections_that_it_closed_meanwhile_are_made_again(self, database: Database, database_url: str) -> None:
+        database.write(store("before"))
+        assert names(database) == ["before"]
+        with psycopg.connect(plain(database_url), autocommit=True) as other:
+            assert len(other.execute(self.END_OTHERS).fetchall()) >= 2
+        database.write(store("after"))
+        assert names(database) == ["before", "after"]
+
+    @pytest.mark.parametrize("together", [1, 5])
+    def test_a_write_that_is_cut_off_is_unavailable_and_stored_nothing(
+        self, database: Database, database_url: str, together: int
+    ) -> None:
+        def cut(conn: Connection) -> None:
+            organisations.ensure(conn, "cut")
+            with psycopg.connect(plain(database_url), autocommit=True) as other:
+                other.execute(self.END_OTHERS)
+            organisations.ensure(conn, "never")
+
+        with ThreadPoolExecutor(together) as pool:
+            results = [pool.submit(database.write, cut) for _ in range(together)]
+        for result in results:
+            with pytest.raises(Problem) as caught:
+                result.result()
+            assert caught.value.slug == "unavailable"
+        assert names(database) == []
+        database.write(store("after"))
+        assert names(database) == ["after"]
+
+    def test_what_is_acknowledged_is_durable_whatever_the_server_s_default(self, empty_url: str) -> None:
+        with psycopg.connect(plain(empty_url), autocommit=True) as other:
+            other.execute(f"ALTER DATABASE {other.info.dbname} SET synchronous_commit = off")  # type: ignore[call-overload]
+        database = Database(empty_url)
+        database.migrate()
+        asked = text("SHOW synchronous_commit")
+        assert database.write(lambda conn: conn.execute(asked).scalar()) == "on"
+        database.close()
 
 
 class TestConcurrency:
