@@ -13,6 +13,7 @@ from typing import Any
 import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
+from postgres import Server
 from sending import Api, changed, impact_body, kinematics, signal, zipped
 
 from headimpact_service.app import create_app
@@ -241,11 +242,23 @@ class TestFaultsOfOurOwn:
         assert SECRET not in answer.text
         assert [record.request_id for record in caplog.records] == ["req-7"]  # type: ignore[attr-defined]
 
+    @pytest.mark.backend("sqlite")
     def test_without_its_database_the_service_is_503_and_says_when_to_come_back(
         self, api: Api, tmp_path: Path, database: Database
     ) -> None:
         database.close()
         shutil.rmtree(tmp_path)
+        self.assert_unavailable(api)
+
+    @pytest.mark.backend("postgresql")
+    def test_without_its_server_the_service_is_503_and_says_when_to_come_back(
+        self, api: Api, database_url: str, postgresql_server: Server
+    ) -> None:
+        postgresql_server.drop(database_url)
+        self.assert_unavailable(api)
+        assert_problem(api.post("/v1/impacts", json=impact_body("e-1")), "unavailable")
+
+    def assert_unavailable(self, api: Api) -> None:
         for answer in (api.get("/readyz"), api.get("/v1/impacts")):
             assert_problem(answer, "unavailable")
             assert int(answer.headers["retry-after"]) > 0

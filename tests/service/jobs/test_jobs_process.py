@@ -10,7 +10,7 @@ from random import Random
 import pytest
 from importing import Importer, ndjson
 
-COUNT = 5000
+COUNT = 2000
 
 
 @pytest.fixture
