@@ -22,18 +22,30 @@ def importer(empty_url: str, tmp_path: Path) -> Iterator[Importer]:
         importer.service.stop()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
+def importers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Importer]]:
+    """Services that every test leaves alive, by the kind of their database: a start costs seconds."""
+    made: dict[str, Importer] = {}
+    yield made
+    for importer in made.values():
+        importer.service.stop()
+
+
+@pytest.fixture
 def served(
-    backend: str, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
-) -> Iterator[Importer]:
-    """One service for all that leave it alive."""
-    folder = tmp_path_factory.mktemp("served")
-    url = f"sqlite:///{folder}/headimpact.db"
-    if backend == "postgresql":
-        url = request.getfixturevalue("postgresql_server").create()
-    served = Importer(folder, url)
-    yield served
-    served.service.stop()
+    backend: str,
+    importers: dict[str, Importer],
+    tmp_path_factory: pytest.TempPathFactory,
+    request: pytest.FixtureRequest,
+) -> Importer:
+    """One service on each kind of database for all that leave it alive."""
+    if backend not in importers:
+        folder = tmp_path_factory.mktemp("served")
+        url = f"sqlite:///{folder}/headimpact.db"
+        if backend == "postgresql":
+            url = request.getfixturevalue("postgresql_server").create()
+        importers[backend] = Importer(folder, url)
+    return importers[backend]
 
 
 def assert_whole(importer: Importer, count: int) -> None:

@@ -45,6 +45,7 @@ def test_head_is_answered_as_get_is_without_the_body(impatient: Service) -> None
 
 class TestFirstStart:
     def test_the_printed_example_works_when_pasted_in_any_folder(self, service: Service, tmp_path: Path) -> None:
+        assert "Research use only" in service.printed
         found = re.search(r"^curl .*$", service.printed, re.MULTILINE)
         assert found
         elsewhere = tmp_path / "elsewhere"
@@ -57,18 +58,6 @@ class TestFirstStart:
             impact = client.get("/v1/impacts").json()["data"][0]
         assert impact["external_id"] == "first-impact"
         assert impact["score"]["quality"] == []
-
-    def test_it_says_that_it_is_for_research_and_makes_one_key_only(self, service: Service, tmp_path: Path) -> None:
-        assert "Research use only" in service.printed
-        key = service.key
-        service.stop()
-        again = Service(tmp_path)
-        try:
-            assert "him_live_" not in again.printed
-            with again.client(key) as client:
-                assert client.get("/v1/me").json()["organisation"] == "default"
-        finally:
-            again.stop()
 
     def test_a_port_that_is_taken_is_one_line_and_leaves_nothing_behind(self, tmp_path: Path) -> None:
         with socket.socket() as other:
@@ -191,7 +180,9 @@ class TestEnds:
     def test_every_201_outlives_twenty_kills_in_the_middle_of_500_requests(self, tmp_path: Path) -> None:
         assert kill_in_the_middle(tmp_path, kills=20, each=500) >= 10_000
 
-    def test_told_to_stop_it_answers_what_is_under_way_first(self, service: Service, tmp_path: Path) -> None:
+    def test_told_to_stop_it_answers_what_is_under_way_first_and_starts_again_with_its_key(
+        self, service: Service, tmp_path: Path
+    ) -> None:
         key = service.key
         senders = Senders(service, key, "stop", count=10_000, enough=30)
         with ThreadPoolExecutor(4) as pool:
@@ -205,6 +196,7 @@ class TestEnds:
         again = Service(tmp_path)
         try:
             assert set(senders.answered) <= stored(again, key)
+            assert "him_live_" not in again.printed
         finally:
             again.stop()
 
