@@ -1,6 +1,6 @@
 """What requests notice of a large import, and what the import costs.
 
-    uv run python benchmarks/import_job.py [--impacts 50000] [--format ndjson|csv] [--rate 20]
+    uv run python benchmarks/import_job.py [--impacts 50000] [--format ndjson|csv|parquet] [--rate 20]
 
 Starts `headimpact serve` in a temporary folder, sends requests at a steady rate, first to the idle service, then while
 a job imports one large file, and prints the times of both, the import's impacts per second, and the most memory that
@@ -29,7 +29,8 @@ import numpy as np
 
 SAMPLES, ONSET, WIDTH = 100, 10, 12
 PEAKS = {"linear_acceleration": ("g", (50, -20, 10)), "angular_velocity": ("rad/s", (5, 20, 8))}
-CSV_MAPPING = {
+TYPES = {"ndjson": "application/x-ndjson", "csv": "text/csv", "parquet": "application/vnd.apache.parquet"}
+CSV_MAPPING: dict[str, Any] = {
     "group_by": ["impact"],
     "external_id": "impact",
     "linear_acceleration": {"unit": "g", "x": "ax", "y": "ay", "z": "az"},
@@ -52,18 +53,43 @@ def kinematics(scale: float) -> dict[str, Any]:
     }
 
 
-def write_file(path: Path, count: int, kind: str) -> None:
-    """Many impacts, no two alike."""
+def write_file(path: Path, count: int, kind: str, least: float = 1.0) -> None:
+    """Many impacts, no two alike; their sizes begin with `least`."""
+    if kind == "parquet":
+        write_parquet(path, count, least)
+        return
     with path.open("w") as file:
         if kind == "csv":
             file.write("impact,ax,ay,az,wx,wy,wz\n")
         for number in range(count):
-            signals = kinematics(1 + number / count)
+            signals = kinematics(least + number / count)
             if kind == "ndjson":
                 file.write(json.dumps({"external_id": f"e-{number}", "kinematics": signals}) + "\n")
                 continue
             columns = [signals[name][axis] for name in PEAKS for axis in "xyz"]
             file.writelines(f"e-{number},{','.join(map(str, row))}\n" for row in zip(*columns, strict=True))
+
+
+def write_parquet(path: Path, count: int, least: float) -> None:
+    """The same impacts as a table with a row a sample, a row group a thousand impacts."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    unit = np.array([wave(peak) for _, peaks in PEAKS.values() for peak in peaks])
+    names = [name for name in CSV_MAPPING["linear_acceleration"] if name in "xyz"]
+    columns = [CSV_MAPPING[name][axis] for name in PEAKS for axis in names]
+    writer = None
+    for first in range(0, count, 1000):
+        numbers = np.arange(first, min(first + 1000, count))
+        values = np.round((least + numbers / count)[:, None, None] * unit, 3)
+        table = pa.table(
+            {"impact": np.repeat([f"e-{number}" for number in numbers], SAMPLES)}
+            | {column: values[:, at].ravel() for at, column in enumerate(columns)}
+        )
+        writer = writer or pq.ParquetWriter(path, table.schema)
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()
 
 
 @contextmanager
@@ -76,12 +102,14 @@ def serving(folder: Path) -> Iterator[tuple[str, str, int]]:
     ):
         assert process.stdout is not None
         key = ""
-        for line in process.stdout:
-            key = line.strip() if line.startswith("him_") else key
-            if found := re.match(r"Listening on (\S+)", line):
-                yield found[1], key, process.pid
-                break
-        process.terminate()
+        try:
+            for line in process.stdout:
+                key = line.strip() if line.startswith("him_") else key
+                if found := re.match(r"Listening on (\S+)", line):
+                    yield found[1], key, process.pid
+                    break
+        finally:
+            process.terminate()
 
 
 @dataclass
@@ -111,7 +139,8 @@ class Load:
 @contextmanager
 def loaded(address: str, headers: dict[str, str], rate: float) -> Iterator[list[Load]]:
     """Both kinds of request, for the time of a block."""
-    loads = [Load(httpx.Client(base_url=address, headers=headers, timeout=60), p, rate) for p in PATHS]
+    paths = PATHS if rate else ()
+    loads = [Load(httpx.Client(base_url=address, headers=headers, timeout=60), path, rate) for path in paths]
     threads = [threading.Thread(target=load.run) for load in loads]
     for thread in threads:
         thread.start()
@@ -152,8 +181,8 @@ def main() -> None:
     """Run both phases."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--impacts", type=int, default=50_000)
-    parser.add_argument("--format", choices=["ndjson", "csv"], default="ndjson")
-    parser.add_argument("--rate", type=float, default=20.0, help="requests a second of each kind")
+    parser.add_argument("--format", choices=list(TYPES), default="ndjson")
+    parser.add_argument("--rate", type=float, default=20.0, help="requests a second of each kind; 0 for none")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -163,7 +192,7 @@ def main() -> None:
         with serving(folder) as (address, key, pid):
             headers = {"Authorization": f"Bearer {key}"}
             with loaded(address, headers, options.rate) as idle:
-                time.sleep(20)
+                time.sleep(20 if options.rate else 0)
             show("idle", idle)
             print(f"memory of the service: {resident_mib(pid)[0]:.0f} MiB")
             with loaded(address, headers, options.rate) as busy:
@@ -176,8 +205,8 @@ def run_import(
     address: str, headers: dict[str, str], file: Path, kind: str, pid: int
 ) -> tuple[dict[str, Any], float, float]:
     """Order the import and wait for its end; the job, and the most memory of the service and of the child."""
-    sent = headers | {"Content-Type": "text/csv" if kind == "csv" else "application/x-ndjson"}
-    params = {"mapping": json.dumps(CSV_MAPPING)} if kind == "csv" else {}
+    sent = headers | {"Content-Type": TYPES[kind]}
+    params = {} if kind == "ndjson" else {"mapping": json.dumps(CSV_MAPPING)}
     child = 0.0
     with httpx.Client(base_url=address, headers=headers, timeout=120) as client, file.open("rb") as data:
         answer = client.post("/v1/imports", content=data, headers=sent, params=params).raise_for_status()
