@@ -7,7 +7,7 @@ import importlib
 import socket
 from typing import Any
 
-from headimpact_service import __version__, logs
+from headimpact_service import __version__, logs, memory
 from headimpact_service.app import create_app
 from headimpact_service.cli.database import migrated
 from headimpact_service.cli.example import curl
@@ -27,6 +27,7 @@ def run(*, host: str | None, port: int | None, database_url: str | None) -> None
     """Bind, migrate, make a first key if there is none, serve."""
     settings = _settings(host=host, port=port, database_url=database_url)
     logs.configure(settings.log_level)
+    memory.give_back()
     listener = listen(settings)  # before anything is made: a port that is taken leaves nothing behind
     address = _address(listener)
     say(f"Headimpact {__version__}. Research use only: the model rests on adult men, and a score is no diagnosis.")

@@ -6,7 +6,7 @@ import signal
 import threading
 from types import FrameType
 
-from headimpact_service import logs
+from headimpact_service import logs, memory
 from headimpact_service.cli.database import migrated
 from headimpact_service.cli.serve import say, spare_the_collector
 from headimpact_service.jobs.engine import engine_of
@@ -17,6 +17,7 @@ def run(*, database_url: str | None) -> None:
     """Work until the process is told to stop; what is under way then is handed back."""
     settings = Settings() if database_url is None else Settings(database_url=database_url)
     logs.configure(settings.log_level)
+    memory.give_back()
     stopped = threading.Event()
 
     def stop(_number: int, _frame: FrameType | None) -> None:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any
 
+from headimpact_service import memory
 from headimpact_service.errors import Problem
 
 NICE = 5
@@ -26,10 +27,11 @@ Task = Callable[[dict[str, Any]], Iterator[Any]]
 
 def main(handle: int) -> None:
     """Serve one task to the parent at the other end of the handle."""
+    memory.give_back()
     conn = Connection(handle)
-    task, arguments, memory = conn.recv()
+    task, arguments, most = conn.recv()
     os.nice(NICE)
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     threading.Thread(target=_end_with_parent, args=(conn,), daemon=True).start()
     conn.send(_last_word(conn, task, arguments))
 

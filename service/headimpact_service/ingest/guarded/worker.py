@@ -17,6 +17,7 @@ from importlib.abc import MetaPathFinder
 
 import numpy as np
 
+from headimpact_service import memory
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import Words
 from headimpact_service.ingest.guarded import limits
@@ -46,6 +47,7 @@ class _WithoutPandas(MetaPathFinder):
 
 def main() -> None:
     """Serve one connection."""
+    memory.give_back()
     sys.meta_path.insert(0, _WithoutPandas())
     kind, descriptor = sys.argv[1], int(sys.argv[2])
     with socket.socket(fileno=descriptor) as connection:
