@@ -19,6 +19,7 @@ from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.source import Source
 
 MAX_LINE = 8 * 1024 * 1024
+_PIECE = 64 * 1024
 """As a JSON body: a line holds one impact."""
 
 
@@ -75,11 +76,12 @@ def _lines(source: Source) -> Iterator[tuple[int, bytes]]:
             number += 1
             if len(line) > MAX_LINE:
                 _pass_over(stream, line)
-            if stripped := line.strip():
-                yield number, line if len(line) > MAX_LINE else stripped
+                yield number, line
+            elif stripped := line.strip():
+                yield number, stripped
 
 
 def _pass_over(stream: BinaryIO, begun: bytes) -> None:
     """Read the rest of a line that is too long."""
     while begun and not begun.endswith(b"\n"):
-        begun = stream.readline(MAX_LINE)
+        begun = stream.readline(_PIECE)

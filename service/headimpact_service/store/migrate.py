@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from alembic.util import CommandError
 from sqlalchemy import Connection, Engine
 
 import headimpact_service
+
+if TYPE_CHECKING:
+    from alembic.script import ScriptDirectory
 
 _ONE_AT_A_TIME = threading.Lock()
 """Alembic keeps the migration that runs in a module's variables."""
@@ -37,6 +36,11 @@ def upgrade(engine: Engine, revision: str = "head") -> None:
     `engine` must begin its transactions with the write lock and hold foreign keys off: with them on, the rebuild of
     a table would delete its children's rows in silence.
     """
+    # Here and below: children open databases too, and only who migrates pays for what does it.
+    from alembic import command
+    from alembic.config import Config
+    from alembic.script import ScriptDirectory
+
     config = Config()
     config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
@@ -49,10 +53,14 @@ def upgrade(engine: Engine, revision: str = "head") -> None:
 
 def current_revision(conn: Connection) -> str | None:
     """The revision of a database, None if it has no tables of ours."""
+    from alembic.runtime.migration import MigrationContext
+
     return MigrationContext.configure(conn).get_current_revision()
 
 
 def _refuse_newer(conn: Connection, scripts: ScriptDirectory) -> None:
+    from alembic.util import CommandError
+
     revision = current_revision(conn)
     if revision is None:
         return

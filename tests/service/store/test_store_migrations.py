@@ -85,7 +85,7 @@ def test_a_migration_that_loses_a_parent_is_rolled_back(database: Database, monk
             text("INSERT INTO data_sets (id, organisation_id, mode) VALUES (x'01', x'02', 'live')")
         )
 
-    monkeypatch.setattr(migrate.command, "upgrade", orphan)
+    monkeypatch.setattr("alembic.command.upgrade", orphan)
     with pytest.raises(MigrationError, match="parent"):
         database.migrate()
     with database.read() as conn:
@@ -96,8 +96,7 @@ def test_a_migration_that_loses_a_parent_is_rolled_back(database: Database, monk
 def test_foreign_keys_are_off_while_a_migration_rebuilds_tables(database: Database, monkeypatch) -> None:
     seen = []
     monkeypatch.setattr(
-        migrate.command,
-        "upgrade",
+        "alembic.command.upgrade",
         lambda config, _: seen.append(
             config.attributes["connection"].exec_driver_sql("PRAGMA foreign_keys").scalar_one()
         ),
