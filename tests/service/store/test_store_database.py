@@ -152,7 +152,10 @@ class TestChecks:
 class TestServer:
     """A server that goes away and comes back."""
 
-    END_OTHERS = "SELECT pg_terminate_backend(pid, 10000) FROM pg_stat_activity WHERE application_name = 'headimpact'"
+    END_OTHERS = (
+        "SELECT pg_terminate_backend(pid, 10000) FROM pg_stat_activity "
+        "WHERE application_name = 'headimpact' AND datname = current_database()"
+    )
 
     def test_connections_that_it_closed_meanwhile_are_made_again(self, database: Database, database_url: str) -> None:
         database.write(store("before"))
