@@ -86,7 +86,7 @@ class Server:
         yield url
         try:
             with psycopg.connect(plain(url), autocommit=True) as conn:
-                conn.execute(_EMPTY)  # type: ignore[call-overload]
+                conn.execute(_EMPTY)  # type: ignore[call-overload]  # psycopg asks for a literal
         except psycopg.Error:  # a test left it locked, or took it apart
             self.drop(url)
             self._used = None
@@ -98,7 +98,7 @@ class Server:
 
     def _run(self, statement: str) -> None:
         with psycopg.connect(plain(self._url), autocommit=True) as conn:
-            conn.execute(statement)  # type: ignore[call-overload]
+            conn.execute(statement)  # type: ignore[call-overload]  # psycopg asks for a literal
 
 
 def plain(url: URL | str) -> str:

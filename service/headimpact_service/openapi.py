@@ -94,8 +94,7 @@ def routes(operations: Sequence[Operation]) -> list[BaseRoute]:
     for path, same_path in by_path(operations).items():
         for operation in same_path:
             route = StrictRoute(operation)
-            if operation.method == "GET":
-                route.methods = {"GET", "HEAD"}
+            route.methods = set(operation.taken)
             found.append(route)
         found.append(Route(path, OtherMethods(same_path), include_in_schema=False))
     return found

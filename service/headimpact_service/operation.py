@@ -110,6 +110,11 @@ class Operation:
     documented: bool = True
 
     @property
+    def taken(self) -> frozenset[str]:
+        """The methods that it answers: HEAD as GET."""
+        return frozenset({self.method, "HEAD"} if self.method == "GET" else {self.method})
+
+    @property
     def media_types(self) -> tuple[str, ...]:
         """The media types of its success, the preferred one first; none for an empty answer."""
         return next(iter(self.answers.values())).media_types
@@ -192,8 +197,7 @@ class OtherMethods:
 
     def __init__(self, operations: Sequence[Operation]) -> None:
         """All `operations` share one path."""
-        taken = {operation.method for operation in operations}
-        self.allowed = ", ".join(sorted(taken | ({"HEAD"} if "GET" in taken else set())))
+        self.allowed = ", ".join(sorted(frozenset[str]().union(*(operation.taken for operation in operations))))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002 - ASGI's signature
         """Refuse one request."""

@@ -36,16 +36,13 @@ def run(*, host: str | None, port: int | None, database_url: str | None) -> None
         for warning in database.warnings():
             say(f"Warning: {warning}")
         app = create_app(settings, database, engine_of(settings, database))
+        importlib.import_module("scipy.signal")  # or the first filtered impact would wait for it
         spare_the_collector()
         serve_until_stopped(app, settings, listener, lambda: say(f"Listening on {address} (documentation: /docs)"))
 
 
 def spare_the_collector() -> None:
-    """What is loaded now stays: a garbage collection that looks through all of it holds every request for 0.2 s.
-
-    So what the first filtered impact would load is loaded before.
-    """
-    importlib.import_module("scipy.signal")
+    """What is loaded now stays: a garbage collection that looks through all of it holds every request for 0.2 s."""
     gc.collect()
     gc.freeze()
 

@@ -19,8 +19,8 @@ from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.source import Source
 
 MAX_LINE = 8 * 1024 * 1024
-_PIECE = 64 * 1024
 """As a JSON body: a line holds one impact."""
+_PIECE = 64 * 1024
 
 
 def read_ndjson(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
@@ -76,7 +76,8 @@ def _lines(source: Source) -> Iterator[tuple[int, bytes]]:
             number += 1
             if len(line) > MAX_LINE:
                 _pass_over(stream, line)
-                yield number, line
+                if not line.isspace():
+                    yield number, line
             elif stripped := line.strip():
                 yield number, stripped
 

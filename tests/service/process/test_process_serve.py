@@ -149,7 +149,7 @@ class Senders:
 def stored(service: Service, key: str) -> set[str]:
     with service.client(key) as client:
         rows = client.get("/v1/impacts", headers={"Accept": "application/x-ndjson"}).text.splitlines()
-    return {re.search(r'"external_id":"([^"]+)"', row)[1] for row in rows}  # type: ignore[index]
+    return {re.search(r'"external_id":"([^"]+)"', row)[1] for row in rows}  # type: ignore[index]  # every row has one
 
 
 def kill_in_the_middle(folder: Path, *, kills: int, each: int) -> int:
@@ -197,6 +197,8 @@ class TestEnds:
         try:
             assert set(senders.answered) <= stored(again, key)
             assert "him_live_" not in again.printed
+            with again.client(key) as client:
+                assert client.get("/v1/me").json()["organisation"] == "default"
         finally:
             again.stop()
 
