@@ -104,7 +104,7 @@ def make_key(database: Database) -> Callable[..., str]:
 
     def make(*scopes: str, organisation: str = "default", mode: str = "live") -> str:
         wanted = scopes or SCOPES
-        return database.write(lambda conn: keys.create_key(conn, organisation, wanted, mode))[1]  # type: ignore[arg-type]
+        return database.write(lambda conn: keys.create_key(conn, organisation, wanted, mode))[1]  # type: ignore[arg-type]  # scopes and mode are words
 
     return make
 

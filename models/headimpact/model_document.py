@@ -104,7 +104,7 @@ def model_from_document(document: Any) -> RiskModel:  # noqa: ANN401 - anything 
     )
 
 
-def _curves(document: Any) -> dict[str, RiskCurve]:  # noqa: ANN401
+def _curves(document: Any) -> dict[str, RiskCurve]:  # noqa: ANN401 - anything may be sent
     if not isinstance(document, Mapping) or not document:
         raise ModelDocumentError("/curves", "At least one criterion's curve is needed.")
     unknown = [key for key in document if key not in BY_KEY]
@@ -113,7 +113,7 @@ def _curves(document: Any) -> dict[str, RiskCurve]:  # noqa: ANN401
     return {key: _curve(document[key], key, f"/curves/{key}") for key in BY_KEY if key in document}
 
 
-def _curve(document: Any, key: str, place: str) -> RiskCurve:  # noqa: ANN401
+def _curve(document: Any, key: str, place: str) -> RiskCurve:  # noqa: ANN401 - anything may be sent
     members = _object(document, place, frozenset({"intercept", "slopes", "covariance"}))
     intercept = _number(members["intercept"], f"{place}/intercept")
     slopes = _numbers(members["slopes"], BY_KEY[key].components, f"{place}/slopes")
@@ -122,7 +122,7 @@ def _curve(document: Any, key: str, place: str) -> RiskCurve:  # noqa: ANN401
     )
 
 
-def _covariance(document: Any, k: int, place: str) -> tuple[tuple[float, ...], ...] | None:  # noqa: ANN401
+def _covariance(document: Any, k: int, place: str) -> tuple[tuple[float, ...], ...] | None:  # noqa: ANN401 - anything may be sent
     if document is None:
         return None
     place += "/covariance"
@@ -138,7 +138,7 @@ def _covariance(document: Any, k: int, place: str) -> tuple[tuple[float, ...], .
     return rows
 
 
-def _operating_points(document: Any, curves: Mapping[str, RiskCurve]) -> dict[str, tuple[KnownPoint, ...]]:  # noqa: ANN401
+def _operating_points(document: Any, curves: Mapping[str, RiskCurve]) -> dict[str, tuple[KnownPoint, ...]]:  # noqa: ANN401 - anything may be sent
     if not isinstance(document, Mapping):
         raise ModelDocumentError("/operating_points", "Operating points are an object by criterion.")
     unknown = [key for key in document if key not in curves]
@@ -153,7 +153,7 @@ def _operating_points(document: Any, curves: Mapping[str, RiskCurve]) -> dict[st
     return found
 
 
-def _point(document: Any, place: str) -> KnownPoint:  # noqa: ANN401
+def _point(document: Any, place: str) -> KnownPoint:  # noqa: ANN401 - anything may be sent
     names = {"sensitivity", "specificity", "linear_predictor", "linear_predictor_interval"}
     members = _object(document, place, frozenset(names))
     shares = {name: _share(members[name], f"{place}/{name}") for name in ("sensitivity", "specificity")}
@@ -171,7 +171,7 @@ def _point(document: Any, place: str) -> KnownPoint:  # noqa: ANN401
     )
 
 
-def _cohort(document: Any) -> dict[str, Any]:  # noqa: ANN401
+def _cohort(document: Any) -> dict[str, Any]:  # noqa: ANN401 - anything may be sent
     if not isinstance(document, Mapping):
         raise ModelDocumentError("/cohort", "The cohort is an object.")
     for name, value in document.items():
@@ -181,7 +181,7 @@ def _cohort(document: Any) -> dict[str, Any]:  # noqa: ANN401
     return dict(document)
 
 
-def _object(document: Any, place: str, members: frozenset[str]) -> Mapping[str, Any]:  # noqa: ANN401
+def _object(document: Any, place: str, members: frozenset[str]) -> Mapping[str, Any]:  # noqa: ANN401 - anything may be sent
     if not isinstance(document, Mapping):
         raise ModelDocumentError(place, "An object is needed.")
     missing, unknown = sorted(members - set(document)), sorted(set(document) - members)
@@ -192,25 +192,25 @@ def _object(document: Any, place: str, members: frozenset[str]) -> Mapping[str, 
     return document
 
 
-def _text(value: Any, place: str) -> str:  # noqa: ANN401
+def _text(value: Any, place: str) -> str:  # noqa: ANN401 - anything may be sent
     if not isinstance(value, str) or not 0 < len(value) <= MAX_TEXT or not value.isprintable():
         raise ModelDocumentError(place, f"Printable text of 1 to {MAX_TEXT} characters is needed.")
     return value
 
 
-def _number(value: Any, place: str) -> float:  # noqa: ANN401
+def _number(value: Any, place: str) -> float:  # noqa: ANN401 - anything may be sent
     if isinstance(value, bool) or not isinstance(value, int | float) or not -MAX_NUMBER <= value <= MAX_NUMBER:
         raise ModelDocumentError(place, "A finite number is needed.")
     return float(value)
 
 
-def _numbers(value: Any, count: int, place: str) -> list[float]:  # noqa: ANN401
+def _numbers(value: Any, count: int, place: str) -> list[float]:  # noqa: ANN401 - anything may be sent
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != count:
         raise ModelDocumentError(place, f"A list of {count} numbers is needed.")
     return [_number(part, f"{place}/{i}") for i, part in enumerate(value)]
 
 
-def _share(value: Any, place: str) -> float:  # noqa: ANN401
+def _share(value: Any, place: str) -> float:  # noqa: ANN401 - anything may be sent
     found = _number(value, place)
     if not 0.0 <= found <= 1.0:
         raise ModelDocumentError(place, "A share is 0 to 1.")

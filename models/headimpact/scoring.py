@@ -277,7 +277,7 @@ def _intervals(values: FloatArray, predictors: FloatArray, model: RiskModel) -> 
         for j in range(4):
             variance += x[i] * covariances[:, i, j] * x[j]
     half = NORMAL_975 * np.sqrt(np.maximum(variance, 0.0))
-    return np.stack((expit(-(predictors + half)), expit(-(predictors - half))), axis=-1).tolist()  # type: ignore[no-any-return]
+    return np.stack((expit(-(predictors + half)), expit(-(predictors - half))), axis=-1).tolist()  # type: ignore[no-any-return]  # NumPy types tolist as Any
 
 
 def _angle_rows(evaluation: Evaluation) -> tuple[list[float], list[list[int]] | None]:

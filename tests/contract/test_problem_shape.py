@@ -240,7 +240,7 @@ class TestFaultsOfOurOwn:
         assert_problem(answer, "internal-error")
         assert "req-7" in answer.json()["detail"]
         assert SECRET not in answer.text
-        assert [record.request_id for record in caplog.records] == ["req-7"]  # type: ignore[attr-defined]
+        assert [record.request_id for record in caplog.records] == ["req-7"]  # type: ignore[attr-defined]  # set by our log filter
 
     @pytest.mark.backend("sqlite")
     def test_without_its_database_the_service_is_503_and_says_when_to_come_back(

@@ -209,7 +209,7 @@ def _text(cell: Any) -> str:  # noqa: ANN401 - a cell of any type
     return text[1:] if text.startswith(FORMULA_GUARD) else text
 
 
-def _outcome(cell: Any, row: int) -> float | None:  # noqa: ANN401
+def _outcome(cell: Any, row: int) -> float | None:  # noqa: ANN401 - a cell of any type
     try:
         return outcome_of(_text(cell))
     except CalibrationError as error:
@@ -230,7 +230,7 @@ def _exclusions(
     ]
 
 
-def _flag(cell: Any, row: int) -> bool | None:  # noqa: ANN401
+def _flag(cell: Any, row: int) -> bool | None:  # noqa: ANN401 - a cell of any type
     word = _text(cell).lower()
     if word not in {"", "true", "false", "1", "0"}:
         raise TableError(f"Row {row}, column worn: true, false or nothing is needed.")

@@ -49,7 +49,7 @@ def promote(version: str, *, reason: str, organisation: str, mode: str, database
     with migrated(database_url) as database:
         data_set = _data_set(database, organisation, mode)
 
-        def change(conn: Any) -> str | None:  # noqa: ANN401
+        def change(conn: Any) -> str | None:  # noqa: ANN401 - a connection of the store
             model = registry.model_of(conn, data_set, version)
             found = organisations.find(conn, organisation)
             if found is not None:
@@ -64,7 +64,7 @@ def promote(version: str, *, reason: str, organisation: str, mode: str, database
 
 
 def _data_set(database: Database, organisation: str, mode: str) -> bytes:
-    def find(conn: Any) -> bytes:  # noqa: ANN401
+    def find(conn: Any) -> bytes:  # noqa: ANN401 - a connection of the store
         found = organisations.ensure(conn, organisation)
         return organisations.ensure_data_set(conn, found.id, cast("Literal['live', 'test']", mode))
 

@@ -176,7 +176,7 @@ def _tell(held: CohortTable, document: Mapping[str, Any], written: Sequence[Path
 def _summary(document: Mapping[str, Any]) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading, justify in (("criterion", "left"), ("deviance", "right"), ("AUC", "right"), ("out of fold", "right")):
-        table.add_column(heading, justify=justify)  # type: ignore[arg-type]
+        table.add_column(heading, justify=justify)  # type: ignore[arg-type]  # one of rich's words
     for name, one in document["criteria"].items():
         numbers = (one["deviance"], one["auc"]["value"], one["out_of_fold"]["auc"])
         cells = [

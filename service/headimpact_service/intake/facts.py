@@ -23,7 +23,7 @@ def find(conn: Any, data_set_id: bytes, serial: str | None, athlete_id: str | No
     return _device_in(conn, data_set_id, serial), _athlete_in(conn, data_set_id, athlete_id, external_id)
 
 
-def facts_in(conn: Any, data_set_id: bytes) -> Callable[[ImpactRecord], tuple[ImpactRecord, DeviceFacts]]:  # noqa: ANN401
+def facts_in(conn: Any, data_set_id: bytes) -> Callable[[ImpactRecord], tuple[ImpactRecord, DeviceFacts]]:  # noqa: ANN401 - a connection of the store
     """The same for the records of one file: each device and athlete is looked up once."""
     device_of = cache(partial(_device_in, conn, data_set_id))
     athlete_of = cache(partial(_athlete_in, conn, data_set_id))
@@ -35,11 +35,11 @@ def facts_in(conn: Any, data_set_id: bytes) -> Callable[[ImpactRecord], tuple[Im
     return look_up
 
 
-def _device_in(conn: Any, data_set_id: bytes, serial: str | None) -> DeviceFacts:  # noqa: ANN401
+def _device_in(conn: Any, data_set_id: bytes, serial: str | None) -> DeviceFacts:  # noqa: ANN401 - a connection of the store
     return UNKNOWN_DEVICE if serial is None else _device(devices.get(conn, data_set_id, serial))
 
 
-def _athlete_in(conn: Any, data_set_id: bytes, athlete_id: str | None, external_id: str | None) -> Athlete | None:  # noqa: ANN401
+def _athlete_in(conn: Any, data_set_id: bytes, athlete_id: str | None, external_id: str | None) -> Athlete | None:  # noqa: ANN401 - a connection of the store
     raw = None if athlete_id is None else ids.decode("ath", athlete_id)
     if raw is not None:
         return athletes.get(conn, data_set_id, raw)

@@ -78,7 +78,7 @@ def make_ready(items: Iterable[Item], key_id: bytes | None) -> list[Ready]:
     ]
 
 
-def store(conn: Any, data_set_id: bytes, ready: Sequence[Ready], first: int) -> list[dict[str, Any]]:  # noqa: ANN401
+def store(conn: Any, data_set_id: bytes, ready: Sequence[Ready], first: int) -> list[dict[str, Any]]:  # noqa: ANN401 - a connection of the store
     """Add what can be added, in one transaction; what became of each, numbered from `first`.
 
     A refusal comes before anything of that impact is written, so the others stay.
@@ -86,7 +86,7 @@ def store(conn: Any, data_set_id: bytes, ready: Sequence[Ready], first: int) -> 
     return [_stored(conn, data_set_id, item, index) for index, item in enumerate(ready, first)]
 
 
-def _stored(conn: Any, data_set_id: bytes, item: Ready, index: int) -> dict[str, Any]:  # noqa: ANN401
+def _stored(conn: Any, data_set_id: bytes, item: Ready, index: int) -> dict[str, Any]:  # noqa: ANN401 - a connection of the store
     if isinstance(item.new, Problem):
         return failed_row(index, item.external_id, item.new)
     try:

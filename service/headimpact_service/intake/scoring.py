@@ -196,7 +196,7 @@ _PER_UNIT = {"g": 1.0, "m/s^2": 9.80665, "rad/s": 1.0, "deg/s": 57.2957795130823
 
 def requests_of(stored: Iterable[Mapping[str, object]]) -> tuple[OperatingPointRequest, ...]:
     """The operating points that an organisation has set, as its settings keep them."""
-    return tuple(OperatingPointRequest(**point) for point in stored)  # type: ignore[arg-type]
+    return tuple(OperatingPointRequest(**point) for point in stored)  # type: ignore[arg-type]  # stored as it was validated
 
 
 def terms_of(incidence: float | None, points: Iterable[Mapping[str, object]], model: RiskModel) -> Terms:

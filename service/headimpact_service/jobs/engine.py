@@ -140,7 +140,7 @@ class Engine:
                 transact.enqueue(*run, delay_s=_seconds_until(job.not_before))
             elif not known[run]:
                 self._house.database.write(
-                    lambda conn, job=job: job_runs.hand_back(conn, job.id, job.run, crashes=1)  # type: ignore[misc]
+                    lambda conn, job=job: job_runs.hand_back(conn, job.id, job.run, crashes=1)  # type: ignore[misc]  # the default binds the loop's job
                 )
                 self._woken.set()
 

@@ -59,7 +59,7 @@ def _skip(job: Job, skipped: Any, conn: Any) -> Outcome:  # noqa: ANN401 - of th
     return {"version": None, "skipped": skipped.reason, "promoted": False, "gates": None}
 
 
-def _register(job: Job, fitted: Any, conn: Any) -> Outcome:  # noqa: ANN401
+def _register(job: Job, fitted: Any, conn: Any) -> Outcome:  # noqa: ANN401 - a connection of the store
     """Register the version, unless the cohort has lost an impact since it was read."""
     _require_whole(conn, job, fitted.lines)
     version = fitted.document["version"]
@@ -85,13 +85,13 @@ def _register(job: Job, fitted: Any, conn: Any) -> Outcome:  # noqa: ANN401
     return {"version": version, "skipped": None, "promoted": promoted, "gates": gates}
 
 
-def _note(conn: Any, job: Job, digest: str | None) -> None:  # noqa: ANN401
+def _note(conn: Any, job: Job, digest: str | None) -> None:  # noqa: ANN401 - a connection of the store
     schedule = job.arguments.get("schedule")
     if schedule is not None and digest is not None:
         schedules.note_fit(conn, job.data_set_id, schedule, digest)
 
 
-def _require_whole(conn: Any, job: Job, lines: Sequence[str]) -> None:  # noqa: ANN401
+def _require_whole(conn: Any, job: Job, lines: Sequence[str]) -> None:  # noqa: ANN401 - a connection of the store
     wanted: Mapping[str, Any] = job.arguments["fit"].get("cohort") or {}
     gone = len(set(lines) - set(select(conn, job.data_set_id, wanted).lines))
     if gone:

@@ -60,7 +60,7 @@ def _store(job: Job, part: Any, conn: Any) -> Outcome:  # noqa: ANN401 - of the 
     return counts | {"last": part.last.hex()}
 
 
-def _store_one(job: Job, impact_id: bytes, revision: int, new: Any, conn: Any) -> str:  # noqa: ANN401
+def _store_one(job: Job, impact_id: bytes, revision: int, new: Any, conn: Any) -> str:  # noqa: ANN401 - a connection of the store
     present = impacts.get(conn, job.data_set_id, impact_id)
     if present is None or present.revision != revision:
         return "changed"

@@ -36,8 +36,8 @@ class RawTraceView(TraceView):
     """A signal as it was sent; null where a sample is missing."""
 
     x: list[float | None]  # type: ignore[assignment] # what was scored has no such samples
-    y: list[float | None]  # type: ignore[assignment]
-    z: list[float | None]  # type: ignore[assignment]
+    y: list[float | None]  # type: ignore[assignment]  # what was scored has no such samples
+    z: list[float | None]  # type: ignore[assignment]  # what was scored has no such samples
     sample_rate_hz: float | None
     time_ms: list[float] | None
 

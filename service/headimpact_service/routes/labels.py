@@ -189,11 +189,11 @@ async def label_many(call: Call) -> Response:
     return answer({"data": rows, "summary": counts}, 207)
 
 
-def _label_all(call: Call, lines: Sequence[LabelLine], conn: Any) -> list[dict[str, Any]]:  # noqa: ANN401
+def _label_all(call: Call, lines: Sequence[LabelLine], conn: Any) -> list[dict[str, Any]]:  # noqa: ANN401 - a connection of the store
     return [_labelled(call, line, conn) for line in lines]
 
 
-def _labelled(call: Call, line: LabelLine, conn: Any) -> dict[str, Any]:  # noqa: ANN401
+def _labelled(call: Call, line: LabelLine, conn: Any) -> dict[str, Any]:  # noqa: ANN401 - a connection of the store
     row = {"index": line.index, "impact_id": line.impact_id, "external_id": line.external_id}
     impact_id, fault = None, line.said if isinstance(line.said, Problem) else None
     if fault is None:
@@ -209,7 +209,7 @@ def _labelled(call: Call, line: LabelLine, conn: Any) -> dict[str, Any]:  # noqa
     }
 
 
-def _find(call: Call, line: LabelLine, conn: Any) -> bytes | None:  # noqa: ANN401
+def _find(call: Call, line: LabelLine, conn: Any) -> bytes | None:  # noqa: ANN401 - a connection of the store
     if line.impact_id is None:
         return labels.find_impact(conn, call.data_set_id, external_id=line.external_id)
     known = ids.decode("imp", line.impact_id)

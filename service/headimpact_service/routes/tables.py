@@ -152,12 +152,12 @@ class ParquetForm:
         arrays = [self._column(cells, field) for cells, field in zip(columns, self._schema, strict=True)]
         return self._arrow.Table.from_arrays(arrays, schema=self._schema)
 
-    def _column(self, cells: Sequence[Any], field: Any) -> Any:  # noqa: ANN401
+    def _column(self, cells: Sequence[Any], field: Any) -> Any:  # noqa: ANN401 - pyarrow has no types
         if not cells or not isinstance(cells[0], Repeated):
             return self._arrow.array(cells, field.type)
         return self._arrow.chunked_array([self._repeated(cell, field.type) for cell in cells], field.type)
 
-    def _repeated(self, cell: Repeated, kind: Any) -> Any:  # noqa: ANN401
+    def _repeated(self, cell: Repeated, kind: Any) -> Any:  # noqa: ANN401 - pyarrow has no types
         if isinstance(cell.value, str | float | int | bool | datetime | None):
             return self._arrow.repeat(self._arrow.scalar(cell.value, kind), cell.count)
         return self._arrow.array(cell.value, kind, from_pandas=True)

@@ -284,7 +284,7 @@ def answered(*frames: wire.Frame | bytes) -> Iterator[guard.GuardedTable | guard
         kind = "npz"
 
     try:
-        yield from guard.Reading("npz", Held(), 0).contents()  # type: ignore[arg-type]
+        yield from guard.Reading("npz", Held(), 0).contents()  # type: ignore[arg-type]  # a stand-in
     finally:
         ours.close()
         theirs.close()

@@ -100,7 +100,7 @@ class TestDeath:
             raise Killed
 
         kind = Counting()
-        kind.run = end  # type: ignore[method-assign]
+        kind.run = end  # type: ignore[method-assign]  # what the test replaces
         for _ in range(MAX_CRASHES + 1):
             crash(house, job, kind)
         assert attempt(house, job, Counting()).state == "succeeded"
@@ -154,7 +154,7 @@ class TestFailure:
         assert done.problem is not None
         assert (done.state, done.problem["status"], done.result) == ("failed", 500, {"n": 10})
         assert "secret" not in done.problem["detail"]
-        assert next(record.job for record in caplog.records) in done.problem["detail"]  # type: ignore[attr-defined]
+        assert next(record.job for record in caplog.records) in done.problem["detail"]  # type: ignore[attr-defined]  # set by our log filter
 
     def test_a_database_that_cannot_be_written_now_is_another_run(self, house: House, job: Job) -> None:
         waiting = attempt(house, job, at(0, Problem("unavailable", "The database cannot take this write now.")))
