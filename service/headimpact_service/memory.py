@@ -1,12 +1,15 @@
-"""How the C library's allocator is told to give memory back."""
+"""How memory that is no longer needed is given back to the system."""
 
 from __future__ import annotations
 
 import ctypes
 from contextlib import suppress
+from pathlib import Path
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 """The numbers of glibc's `mallopt`."""
+_DONT_NEED = 4
+"""The advice `MADV_DONTNEED` of Linux."""
 
 
 def give_back() -> None:
@@ -21,3 +24,27 @@ def give_back() -> None:
         mallopt(_ARENA_MAX, 2)
         mallopt(_MMAP_THRESHOLD, 256 * 1024)
         mallopt(_TRIM_THRESHOLD, 1024 * 1024)
+
+
+def let_go_of_code() -> None:
+    """Unmap the pages of program code that loading has touched; what is needed again comes back from the file.
+
+    A large library runs much of its code once, as it is loaded, and every page of it counts from then on:
+    half of what a process takes that has loaded pyarrow. Code is never written to, so nothing is lost. Nothing happens
+    where the system is another than Linux.
+    """
+    with suppress(OSError, AttributeError):
+        madvise = ctypes.CDLL(None).madvise
+        for start, length in _code():
+            madvise(ctypes.c_void_p(start), ctypes.c_size_t(length), _DONT_NEED)
+
+
+def _code() -> list[tuple[int, int]]:
+    """Where files are mapped as code that nobody can write to: start and length [bytes]."""
+    found: list[tuple[int, int]] = []
+    for line in Path("/proc/self/maps").read_text().splitlines():
+        span, access, _offset, _device, inode, *_ = line.split()
+        if access == "r-xp" and inode != "0":
+            start, end = (int(edge, 16) for edge in span.split("-"))
+            found.append((start, end - start))
+    return found

@@ -6,7 +6,7 @@ import gc
 import os
 import resource
 
-MAX_RESIDENT = 130 * 1024 * 1024
+MAX_RESIDENT = 110 * 1024 * 1024
 """Bytes of memory of the whole process, its libraries included, while it reads a file."""
 LEAST_ALLOWANCE = 48 * 1024 * 1024
 GROWTH = 16 * 1024 * 1024

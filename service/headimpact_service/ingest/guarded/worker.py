@@ -66,7 +66,8 @@ def serve(connection: socket.socket, kind: str) -> None:
         return
     gc.collect()
     gc.freeze()
-    memory = limits.Memory()
+    memory.let_go_of_code()
+    allowed = limits.Memory()
     limits.close_doors()
     send(connection, Frame("ready"))
     while True:
@@ -74,9 +75,9 @@ def serve(connection: socket.socket, kind: str) -> None:
         if stream is None:
             return
         with stream:
-            memory.before_file(_size(stream))
+            allowed.before_file(_size(stream))
             sound = answer(connection, reader, stream)
-        stays = sound and not memory.has_grown()
+        stays = sound and not allowed.has_grown()
         send(connection, Frame("rest", {"stays": stays}))
         if not stays:
             return
