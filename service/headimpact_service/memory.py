@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 from contextlib import suppress
 from pathlib import Path
 
@@ -10,6 +11,8 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 """The numbers of glibc's `mallopt`."""
 _DONT_NEED = 4
 """The advice `MADV_DONTNEED` of Linux."""
+_COLLECT_AFTER = 10_000
+"""New objects after which the youngest are looked through for cycles: Python's 700 are not those of two requests."""
 
 
 def give_back() -> None:
@@ -24,6 +27,17 @@ def give_back() -> None:
         mallopt(_ARENA_MAX, 2)
         mallopt(_MMAP_THRESHOLD, 256 * 1024)
         mallopt(_TRIM_THRESHOLD, 1024 * 1024)
+
+
+def spare_the_collector() -> None:
+    """Have garbage collections look at what is new only, and less often.
+
+    What is loaded now stays; a collection that looks through all of it holds every request for 0.2 s, and one after
+    every 700 objects takes a quarter of the time of an upload.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(_COLLECT_AFTER)
 
 
 def let_go_of_code() -> None:

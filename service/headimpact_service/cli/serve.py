@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import importlib
 import socket
 from typing import Any
@@ -37,14 +36,8 @@ def run(*, host: str | None, port: int | None, database_url: str | None) -> None
             say(f"Warning: {warning}")
         app = create_app(settings, database, engine_of(settings, database))
         importlib.import_module("scipy.signal")  # or the first filtered impact would wait for it
-        spare_the_collector()
+        memory.spare_the_collector()
         serve_until_stopped(app, settings, listener, lambda: say(f"Listening on {address} (documentation: /docs)"))
-
-
-def spare_the_collector() -> None:
-    """What is loaded now stays: a garbage collection that looks through all of it holds every request for 0.2 s."""
-    gc.collect()
-    gc.freeze()
 
 
 def say(line: str) -> None:

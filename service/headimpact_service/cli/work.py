@@ -8,7 +8,7 @@ from types import FrameType
 
 from headimpact_service import logs, memory
 from headimpact_service.cli.database import migrated
-from headimpact_service.cli.serve import say, spare_the_collector
+from headimpact_service.cli.serve import say
 from headimpact_service.jobs.engine import engine_of
 from headimpact_service.settings import Settings
 
@@ -27,7 +27,7 @@ def run(*, database_url: str | None) -> None:
         signal.signal(number, stop)
     with migrated(settings.database_url) as database:
         engine = engine_of(settings, database)
-        spare_the_collector()
+        memory.spare_the_collector()
         engine.start()
         say("Working.")
         stopped.wait()

@@ -40,6 +40,7 @@ def _last_word(conn: Connection, task: str, arguments: dict[str, Any]) -> tuple[
     """Say that work begins, send everything that the task yields; how it ended."""
     try:
         loaded = _load(task)
+        memory.spare_the_collector()
         conn.send(("begins", None))
         for value in loaded(arguments):
             conn.send(("value", value))

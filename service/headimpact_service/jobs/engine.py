@@ -5,7 +5,6 @@ It starts DBOS with the first job, not before: its import costs seconds and some
 
 from __future__ import annotations
 
-import gc
 import logging
 import threading
 import time
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy.engine import URL
 from sqlalchemy.exc import SQLAlchemyError
 
+from headimpact_service import memory
 from headimpact_service.deps import uploads_of
 from headimpact_service.intake.cron import next_due
 from headimpact_service.jobs import runs
@@ -121,9 +121,7 @@ class Engine:
         from headimpact_service.jobs.transact import Transact  # costs seconds: not before there is a job
 
         launched = Transact(self._records(), slot.name, self._run, at_once=self._at_once)
-        # What was loaded stays; the many objects of a part would have the collector look through it again and again.
-        gc.collect()
-        gc.freeze()
+        memory.spare_the_collector()
         return launched
 
     def _records(self) -> URL:

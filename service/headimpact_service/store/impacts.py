@@ -93,11 +93,15 @@ _KNOWN = Prepared(
         .scalar_subquery(),
     )
 )
-_SAME_EVENT = select(impacts.c.id).where(
-    impacts.c.data_set_id == _DATA_SET,
-    impacts.c.input_digest == bindparam("input_digest"),
-    impacts.c.athlete_id.is_not_distinct_from(bindparam("athlete_id")),
-    impacts.c.occurred_at.is_not_distinct_from(bindparam("occurred_at")),
+_SAME_EVENT = Prepared(
+    select(impacts.c.id)
+    .where(
+        impacts.c.data_set_id == _DATA_SET,
+        impacts.c.input_digest == bindparam("input_digest"),
+        impacts.c.athlete_id.is_not_distinct_from(bindparam("athlete_id")),
+        impacts.c.occurred_at.is_not_distinct_from(bindparam("occurred_at")),
+    )
+    .limit(1)
 )
 _INSERT_IMPACT = Prepared(insert(impacts), [column.name for column in impacts.c])
 _INSERT_REVISION = Prepared(insert(impact_revisions), [column.name for column in impact_revisions.c])
@@ -153,8 +157,8 @@ def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Kn
         "athlete_id": athlete_id,
         "occurred_at": new.occurred_at,
     }
-    found = conn.execute(_SAME_EVENT.limit(1), parameters).scalar()
-    return None if found is None else get(conn, data_set_id, found)
+    found = _SAME_EVENT.first(conn, parameters)
+    return None if found is None else get(conn, data_set_id, found[0])
 
 
 def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, impact_id: bytes) -> Outcome:

@@ -373,7 +373,7 @@ def test_the_figures_for_the_planner_lead_to_the_indices(database, data_set) -> 
     """Each lookup of the hot path and of an athlete's list is a search, never a walk through a data set."""
     with database.read() as conn:
         for query, index in (
-            (impacts._SAME_EVENT, "ix_impacts_data_set_id_input_digest_id"),
+            (impacts._SAME_EVENT._statement, "ix_impacts_data_set_id_input_digest_id"),
             (impacts._KNOWN._statement, "ix_impacts_data_set_id_updated_at_id"),
         ):
             compiled = query.compile(dialect=conn.dialect)

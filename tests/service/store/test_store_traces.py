@@ -62,13 +62,19 @@ def test_a_sample_that_is_no_decimal_of_the_others_kind_is_kept_as_it_is(value: 
     assert traces.decode(traces.encode({"a": changed}))["a"].tobytes() == changed.tobytes()
 
 
-def test_what_was_written_today_is_read_for_ever() -> None:
+def test_a_frame_that_was_written_today_is_read_for_ever() -> None:
+    fixed = bytes([2, 1]) + bytes.fromhex("01 04 01 03000000 01000000") + b"a"
+    fixed += bytes.fromhex("28b52ffd240c6100000000000000008000203f8040e65215a5")
+    assert traces.decode(fixed)["a"].tobytes() == np.array([1.0, -0.0, 2.5]).tobytes()
+
+
+def test_what_the_first_codec_wrote_is_read_for_ever() -> None:
     fixed = bytes([1, 1]) + bytes.fromhex("01 04 01 03000000 01000000") + b"a"
     fixed += zlib.compress(np.array([1.0, -0.0, 2.5], dtype="<f4").view(np.uint8).reshape(3, 4).T.tobytes())
     assert traces.decode(fixed)["a"].tobytes() == np.array([1.0, -0.0, 2.5]).tobytes()
 
 
-def test_multiples_that_were_written_today_are_read_for_ever() -> None:
+def test_multiples_that_the_first_codec_wrote_are_read_for_ever() -> None:
     fixed = bytes([1, 1]) + bytes.fromhex("01 12 01 03000000 01000000") + b"a"
     fixed += zlib.compress(np.array([150, -275, 1], dtype="<i4").view(np.uint8).reshape(3, 4).T.tobytes())
     assert traces.decode(fixed)["a"].tolist() == [1.5, -1.25, -1.24]
@@ -93,6 +99,14 @@ def test_an_unknown_codec_is_refused() -> None:
 def test_a_truncated_trace_is_refused(damage: slice) -> None:
     with pytest.raises(TraceCodecError, match="damaged"):
         traces.decode(traces.encode({"a": WAVE})[damage])
+
+
+@pytest.mark.parametrize("at", [-1, -20, -200])
+def test_a_byte_that_changed_in_the_samples_is_noticed(at: int) -> None:
+    damaged = bytearray(traces.encode({"a": WAVE}))
+    damaged[at] ^= 1
+    with pytest.raises(TraceCodecError, match="damaged"):
+        traces.decode(bytes(damaged))
 
 
 @pytest.mark.parametrize(("at", "value"), [(3, 5), (4, 3), (5, 101), (5, 99)])
