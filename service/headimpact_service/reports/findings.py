@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from headimpact.calibration.sample_size import events_for_expected_over_observed
 from headimpact_service.reports.figures import criterion_name
 
-FEW_EVENTS = 115
+FEW_EVENTS = events_for_expected_over_observed()
 """Events that E:O within 20 % needs (recalibrations with fewer are mostly noise)."""
 
 
@@ -34,7 +35,7 @@ def _cohort(report: Mapping[str, Any]) -> Iterator[Finding]:
         yield Finding(
             "warning",
             f"{cohort['events']} concussions leave the overall level of the probabilities uncertain by a factor of "
-            f"{factor:.2f} either way (95 %). About {FEW_EVENTS} are needed for 20 %. Treat this as evidence for an "
+            f"{factor:.2f} either way (95 %). {FEW_EVENTS} are needed for 20 %. Treat this as evidence for an "
             "update of the intercept at most, unless the active model is clearly wrong.",
         )
     if cohort["athletes_with_events"] < 10:
