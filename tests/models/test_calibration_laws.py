@@ -92,6 +92,19 @@ class TestFits:
     def test_separation_is_seen_before_any_fit(self, y: list[float], x: list[float], kind: str | None) -> None:
         assert separation(Sample(np.array(y, dtype=float), np.array(x, dtype=float)[:, None])) == kind
 
+    @pytest.mark.parametrize("seed", [0, 9, 16, 19, 22, 26])
+    def test_no_separated_resample_is_called_settled(self, seed: int) -> None:
+        """Small samples with a strong predictor: some resamples are separated, completely or in part, some are not."""
+        generator = np.random.default_rng(seed)
+        x = generator.normal(size=(24, 1)).round(1)
+        y = (x[:, 0] + 0.4 * generator.normal(size=24) > 0.5).astype(float)
+        rows = generator.integers(0, 24, (200, 24))
+        rows = rows[[0 < y[one].sum() < 24 for one in rows]]
+        found = fit_resamples(Sample(y, x), counts_of_rows(rows, 24))
+        overlaps = [separation(Sample(y[one], x[one])) is None for one in rows]
+        assert found.converged.tolist() == overlaps
+        assert 0 < sum(overlaps) < len(overlaps)
+
     def test_firth_of_one_group_adds_half_an_event_to_each_outcome(self) -> None:
         """With the intercept alone, Jeffreys' prior is one half event and one half other."""
         y = np.array([1.0, *[0.0] * 9])

@@ -21,8 +21,10 @@ BoolArray = NDArray[np.bool_]
 Counts = NDArray[np.float64] | NDArray[np.uint16]
 """How often each of n impacts is in each of B resamples, n x B."""
 
-TOLERANCE = 1e-10
-"""Newton stops when no scaled coefficient moves by more."""
+LAST_STEP = 1e-7
+"""Newton stops after a step that moves no scaled coefficient by more: the next is of the order of its square."""
+MAX_CONDITION = 1e14
+"""Beyond this the information says nothing of some direction: one in which a separated resample is on its way."""
 MAX_ITERATIONS = 60
 MAX_HALVINGS = 30
 SAFE_CHANGE = 1.79
@@ -154,7 +156,8 @@ def fit(sample: Sample, weights: FloatArray | None = None) -> LogisticFit:
     scaled_design = sample.design / sample.scale
     scaled = _newton(scaled_design, sample.y, w)
     beta = scaled.coefficients[:, 0]
-    information = _Problem(scaled_design, sample.y).information(w, risk_of(scaled_design @ beta[:, None]))[..., 0]
+    p = risk_of(scaled_design @ beta[:, None])
+    information = _Problem(scaled_design, sample.y).information(w * p * (1.0 - p))[0]
     covariance = np.linalg.inv(information) / np.outer(sample.scale, sample.scale)
     return LogisticFit(sample, beta / sample.scale, covariance, bool(scaled.converged[0]), int(scaled.iterations))
 
@@ -221,20 +224,22 @@ def _newton(design: FloatArray, y: FloatArray, weights: FloatArray, start: Float
         beta[:, working] = start[:, None]
     converged = np.zeros(weights.shape[1], dtype=bool)
     b, w = beta[:, working], weights[:, working]
-    eta = design @ b
+    margin = problem.signed @ b
     iterations = 0
     while working.size and iterations < MAX_ITERATIONS:
         iterations += 1
-        step, solved = problem.step(w, eta)
-        change = design @ step
-        _halve(problem, w, eta, step, change)
-        b, eta = b + step, eta + change
+        step, solved, information = problem.step(w, margin)
+        settled = solved & (np.abs(step).max(axis=0) <= LAST_STEP)
+        settled[settled] = np.linalg.cond(information[settled]) < MAX_CONDITION
+        change = problem.signed @ step
+        _halve(problem, w, margin, step, change)
+        b = b + step
+        margin += change
         beta[:, working] = b
-        settled = np.abs(step).max(axis=0) <= TOLERANCE
-        going_on = ~settled & solved & (np.abs(eta).max(axis=0) <= RUNAWAY)
-        converged[working[settled & solved]] = True
+        converged[working[settled]] = True
+        going_on = ~settled & solved & (step != 0.0).any(axis=0) & ~problem.exceeds(b, margin, RUNAWAY)
         if not going_on.all():
-            working, b, w, eta = working[going_on], b[:, going_on], w[:, going_on], eta[:, going_on]
+            working, b, w, margin = working[going_on], b[:, going_on], w[:, going_on], margin[:, going_on]
     return _Settled(beta, converged, iterations)
 
 
@@ -249,51 +254,69 @@ def _null_coefficients(y: FloatArray, weights: FloatArray, k: int) -> FloatArray
 
 def risk_of(eta: FloatArray) -> FloatArray:
     """1/(1 + exp(-eta)), three times as fast as SciPy's `expit`; a linear predictor of -710 and less gives 0."""
+    p = np.negative(eta)
     with np.errstate(over="ignore"):
-        p = np.exp(-eta)
+        np.exp(p, out=p)
     p += 1.0
     return np.divide(1.0, p, out=p)
 
 
 class _Problem:
-    """Rows that all replicas share, with what is computed from them once."""
+    """Rows that all replicas share, with what is computed from them once.
+
+    A row counts by its margin: its linear predictor, with the opposite sign where there was no event. The chance of the
+    outcome that was not seen is 1/(1 + exp(margin)), and has all its digits however small it is: a separated resample
+    sends every margin to infinity, and must not seem to arrive.
+    """
 
     def __init__(self, design: FloatArray, y: FloatArray) -> None:
-        self.design, self.y, self.outcome = design, y, y[:, None]
+        self.signed = design * np.where(y == 1.0, 1.0, -1.0)[:, None]
+        self.largest = np.abs(design).max(axis=0)
         self.k = design.shape[1]
-        rows, columns = np.triu_indices(self.k)
+        self.pairs = rows, columns = np.triu_indices(self.k)
         # the products of each pair of columns: their weighted sums are the information
         self.products = np.ascontiguousarray((design[:, rows] * design[:, columns]).T)
 
-    def information(self, w: FloatArray, p: FloatArray) -> FloatArray:
-        """X' W X of every replica, k x k x B."""
-        spread = 1.0 - p
-        spread *= p
-        spread *= w
+    def step(self, w: FloatArray, margin: FloatArray) -> tuple[FloatArray, BoolArray, FloatArray]:
+        """Newton's step of every replica, k x B, whether its equations had a solution, and their matrix, B x k x k."""
+        missed = risk_of(-margin)
+        spread = w * missed
+        gradient = self.signed.T @ spread
+        missed *= spread
+        spread -= missed
+        information = self.information(spread)
+        try:
+            solved = np.linalg.solve(information, gradient.T[..., None])
+        except np.linalg.LinAlgError:
+            return *_steps_one_by_one(information, gradient), information
+        return np.asarray(solved[..., 0].T, dtype=np.float64), np.ones(solved.shape[0], dtype=bool), information
+
+    def information(self, spread: FloatArray) -> FloatArray:
+        """X' W X of every replica, B x k x k, from the weights times the variances of the outcomes."""
         sums = self.products @ spread
-        rows, columns = np.triu_indices(self.k)
-        full = np.empty((self.k, self.k, sums.shape[1]))
-        full[rows, columns] = sums
-        full[columns, rows] = sums
+        rows, columns = self.pairs
+        full = np.empty((sums.shape[1], self.k, self.k))
+        full[:, rows, columns] = sums.T
+        full[:, columns, rows] = sums.T
         return full
 
-    def step(self, w: FloatArray, eta: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Newton's step of every replica, and whether its equations had a solution."""
-        p = risk_of(eta)
-        residual = self.outcome - p
-        residual *= w
-        gradient = self.design.T @ residual
-        information = self.information(w, p)
-        try:
-            solved = np.linalg.solve(information.transpose(2, 0, 1), gradient.T[..., None])
-        except np.linalg.LinAlgError:
-            return _steps_one_by_one(information, gradient)
-        return np.asarray(solved[..., 0].T, dtype=np.float64), np.ones(solved.shape[0], dtype=bool)
+    def exceeds(self, coefficients: FloatArray, margin: FloatArray, limit: float) -> BoolArray:
+        """Whether some |margin| = |X b| of a replica is beyond a limit; looked at only where its bound is."""
+        found = np.asarray(self.largest @ np.abs(coefficients) > limit)
+        for column in np.flatnonzero(found):
+            found[column] = np.abs(margin[:, column]).max() > limit
+        return found
 
-    def log_likelihood(self, w: FloatArray, eta: FloatArray) -> FloatArray:
-        """Of every replica: the sum of w (y eta - log(1 + exp(eta)))."""
-        total: FloatArray = (w * (self.outcome * eta - np.logaddexp(0.0, eta))).sum(axis=0)
-        return total
+    @staticmethod
+    def log_likelihood(w: FloatArray, margin: FloatArray) -> FloatArray:
+        """Of every replica: the sum of -w log(1 + exp(-margin))."""
+        lost = np.abs(margin)
+        np.negative(lost, out=lost)
+        np.exp(lost, out=lost)
+        np.log1p(lost, out=lost)
+        lost -= np.minimum(margin, 0.0)
+        found: FloatArray = -np.einsum("nb,nb->b", w, lost)
+        return found
 
 
 def _steps_one_by_one(information: FloatArray, gradient: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -301,24 +324,24 @@ def _steps_one_by_one(information: FloatArray, gradient: FloatArray) -> tuple[Fl
     step, solved = np.zeros_like(gradient), np.ones(gradient.shape[1], dtype=bool)
     for column in range(gradient.shape[1]):
         try:
-            step[:, column] = np.linalg.solve(information[..., column], gradient[:, column])
+            step[:, column] = np.linalg.solve(information[column], gradient[:, column])
         except np.linalg.LinAlgError:
             solved[column] = False
     return step, solved
 
 
-def _halve(problem: _Problem, w: FloatArray, eta: FloatArray, step: FloatArray, change: FloatArray) -> None:
-    """Halve steps, and the changes of eta that they make, as often as it takes for no likelihood to fall; in place.
+def _halve(problem: _Problem, w: FloatArray, margin: FloatArray, step: FloatArray, change: FloatArray) -> None:
+    """Halve steps, and the changes of margins that they make, until no likelihood falls; in place.
 
     A full step that moves no linear predictor by more than :data:`SAFE_CHANGE` cannot lower a logistic likelihood.
     """
-    doubtful = np.flatnonzero(np.abs(change).max(axis=0) > SAFE_CHANGE)
+    doubtful = np.flatnonzero(problem.exceeds(step, change, SAFE_CHANGE))
     if not doubtful.size:
         return
-    before = problem.log_likelihood(w[:, doubtful], eta[:, doubtful])
+    before = problem.log_likelihood(w[:, doubtful], margin[:, doubtful])
     before -= 1e-12 * np.abs(before)
     for _ in range(MAX_HALVINGS):
-        after = problem.log_likelihood(w[:, doubtful], eta[:, doubtful] + change[:, doubtful])
+        after = problem.log_likelihood(w[:, doubtful], margin[:, doubtful] + change[:, doubtful])
         falling = ~(after >= before)
         doubtful, before = doubtful[falling], before[falling]
         if not doubtful.size:
