@@ -1,19 +1,21 @@
 """The rules of a recording: what breaks one is refused with where, and nothing is scored.
 
-The bounds are in data/quality.toml. Messages name the bound, never the offending value.
+The bounds are in data/quality.toml. Messages name the bound, never the offending value. Preparation stops at the first
+fault that it meets; :func:`broken_rules` then looks for all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from headimpact.errors import TraceError
+from headimpact.gaps import fill_gaps
 from headimpact.kinematics import FloatArray
 from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import AXES, words
-from headimpact.recording import Signal, SignalName
+from headimpact.recording import TO_CRITERIA_UNIT, Recording, Signal, SignalName
 
 UNITS_OF: dict[str, tuple[str, str]] = {
     "linear_acceleration": ("g", "m/s^2"),
@@ -26,21 +28,31 @@ def require_form(signals: list[tuple[SignalName, Signal]]) -> None:
     """Refuse signals whose form no samples could make up for: none at all, their shape, length, unit or times."""
     if not signals:
         raise TraceError("no-signal", "A recording needs linear acceleration, angular velocity or both.")
-    limits = QUALITY_LIMITS["record"]
     for name, signal in signals:
-        if signal.values.ndim != 2 or signal.values.shape[1] != 3:
-            raise TraceError("wrong-shape", f"The {words(name)} must have three components.", signal=name)
-        if not limits["minimum_samples"] <= signal.values.shape[0] <= limits["maximum_samples"]:
-            raise TraceError(
-                "sample-count",
-                f"The {words(name)} must have {limits['minimum_samples']} to {limits['maximum_samples']} samples.",
-                signal=name,
-            )
-        if signal.unit not in UNITS_OF[name]:
-            raise TraceError(
-                "unknown-unit", f"The {words(name)} must be in {' or '.join(UNITS_OF[name])}.", signal=name
-            )
-        _require_time_base(name, signal)
+        if (fault := _fault_of_form(name, signal)) is not None:
+            raise fault
+
+
+def _fault_of_form(name: SignalName, signal: Signal) -> TraceError | None:
+    """What is wrong with a signal before its samples are looked at; None if nothing."""
+    limits = QUALITY_LIMITS["record"]
+    if signal.values.ndim != 2 or signal.values.shape[1] != 3:
+        return TraceError("wrong-shape", f"The {words(name)} must have three components.", signal=name)
+    if not limits["minimum_samples"] <= signal.values.shape[0] <= limits["maximum_samples"]:
+        return TraceError(
+            "sample-count",
+            f"The {words(name)} must have {limits['minimum_samples']} to {limits['maximum_samples']} samples.",
+            signal=name,
+        )
+    if signal.unit not in UNITS_OF[name]:
+        return TraceError("unknown-unit", f"The {words(name)} must be in {' or '.join(UNITS_OF[name])}.", signal=name)
+    if (signal.sample_rate_hz is None) == (signal.time_s is None):
+        return TraceError(
+            "time-base", f"The {words(name)} must have either a sample rate or time stamps, and not both.", signal=name
+        )
+    if signal.time_s is not None and signal.time_s.shape != signal.values.shape[:1]:
+        return TraceError("stamp-count", f"The {words(name)} must have one time stamp per sample.", signal=name)
+    return None
 
 
 def require_rate(name: SignalName, rate_hz: float) -> None:
@@ -69,10 +81,13 @@ def require_samples(signals: Sequence[tuple[SignalName, FloatArray]]) -> None:
 
 def require_finite(name: SignalName, values: FloatArray) -> None:
     """Refuse a missing sample."""
-    finite = np.isfinite(values)
-    if not finite.all():
-        index, axis = np.argwhere(~finite)[0]
-        raise TraceError(
+    if not np.isfinite(values).all():
+        raise next(_missing(name, values))
+
+
+def _missing(name: SignalName, values: FloatArray) -> Iterator[TraceError]:
+    for index, axis in np.argwhere(~np.isfinite(values)):
+        yield TraceError(
             "missing-sample",
             f"The {words(name)} holds a value that is no number.",
             signal=name,
@@ -81,53 +96,85 @@ def require_finite(name: SignalName, values: FloatArray) -> None:
         )
 
 
-def _require_time_base(name: SignalName, signal: Signal) -> None:
-    """Refuse a signal whose times are not known, or known twice."""
-    if (signal.sample_rate_hz is None) == (signal.time_s is None):
-        raise TraceError(
-            "time-base", f"The {words(name)} must have either a sample rate or time stamps, and not both.", signal=name
-        )
-    if signal.time_s is not None and signal.time_s.shape != signal.values.shape[:1]:
-        raise TraceError("stamp-count", f"The {words(name)} must have one time stamp per sample.", signal=name)
-
-
 def rate_of(name: SignalName, time_s: FloatArray) -> float:
     """Samples per second of stamps that increase, each step within 15 % of the median one [Hz]."""
+    for fault in _faults_of_stamps(name, time_s):
+        raise fault
+    return float((time_s.size - 1) / (time_s[-1] - time_s[0]))
+
+
+def _faults_of_stamps(name: SignalName, time_s: FloatArray) -> Iterator[TraceError]:
+    """Every stamp that does not follow the one before it; where all do, every step that is not like the others."""
     steps = np.diff(time_s)
     stuck = np.flatnonzero(~(steps > 0))
-    if stuck.size:
-        raise TraceError(
+    for place in stuck:
+        yield TraceError(
             "time-not-increasing",
             f"The time stamps of the {words(name)} must increase from sample to sample.",
             signal=name,
-            index=int(stuck[0]) + 1,
+            index=int(place) + 1,
         )
+    if stuck.size:
+        return
     bound = QUALITY_LIMITS["record"]["maximum_jitter"]
     median = float(np.median(steps))
-    far = np.flatnonzero(np.abs(steps - median) > bound * median)
-    if far.size:
-        raise TraceError(
+    for place in np.flatnonzero(np.abs(steps - median) > bound * median):
+        yield TraceError(
             "time-jitter",
             f"The steps between time stamps of the {words(name)} must stay within {bound:.0%} of their median.",
             signal=name,
-            index=int(far[0]) + 1,
+            index=int(place) + 1,
         )
-    return float((time_s.size - 1) / (time_s[-1] - time_s[0]))
 
 
 def require_within(name: SignalName, values: FloatArray) -> None:
     """Refuse samples that no head survives to send: they are another unit or a broken channel."""
     bound = QUALITY_LIMITS[name]["refused"]
-    if values.max() <= bound and values.min() >= -bound:
-        return
-    index, axis = np.argwhere(np.abs(values) > bound)[0]
-    raise TraceError(
-        "value-out-of-range",
-        f"The {words(name)} must stay within {bound:g} {UNITS_OF[name][0]}; check the unit it was sent in.",
-        signal=name,
-        channel=AXES[axis],
-        index=int(index),
-    )
+    if values.max() > bound or values.min() < -bound:
+        raise next(_beyond(name, values))
+
+
+def _beyond(name: SignalName, values: FloatArray) -> Iterator[TraceError]:
+    bound = QUALITY_LIMITS[name]["refused"]
+    for index, axis in np.argwhere((np.abs(values) > bound) & np.isfinite(values)):
+        yield TraceError(
+            "value-out-of-range",
+            f"The {words(name)} must stay within {bound:g} {UNITS_OF[name][0]}; check the unit it was sent in.",
+            signal=name,
+            channel=AXES[axis],
+            index=int(index),
+        )
+
+
+def broken_rules(recording: Recording) -> Iterator[TraceError]:
+    """Every fault of a recording's signals, signal by signal, for the answer to whoever sent it.
+
+    What can only be seen once the signals are prepared is not among them: that nothing moves, a derivative beyond any
+    head, a rotation that is none.
+    """
+    for name, signal in recording.signals():
+        fault = _fault_of_form(name, signal)
+        if fault is not None:
+            yield fault
+            continue
+        whole = fill_gaps(signal)[0] if recording.fill_gaps else signal
+        yield from _missing(name, whole.values)
+        yield from _beyond(name, whole.values * TO_CRITERIA_UNIT[whole.unit])
+        yield from _faults_of_times(name, whole)
+
+
+def _faults_of_times(name: SignalName, signal: Signal) -> Iterator[TraceError]:
+    """Of the stamps, or of the rate that they say or that was given."""
+    rate = signal.sample_rate_hz
+    if signal.time_s is not None:
+        faults = list(_faults_of_stamps(name, signal.time_s))
+        yield from faults
+        rate = None if faults else rate_of(name, signal.time_s)
+    if rate is not None:
+        try:
+            require_rate(name, rate)
+        except TraceError as fault:
+            yield fault
 
 
 def derived_out_of_range() -> TraceError:

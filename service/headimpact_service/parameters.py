@@ -9,15 +9,17 @@ from functools import cache
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
+from pydantic_core import ErrorDetails
 from starlette.requests import Request
 
+from headimpact_service.broken_rules import broken_rule
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 
 MAX_NAME = 100
 """An unknown parameter's name is the caller's text: it is shown, but not at any length."""
 
-_WHOLE = re.compile(r"\d{1,18}", re.ASCII)
-_DECIMAL = re.compile(r"\d{1,18}(\.\d{1,18})?([eE][-+]?\d{1,3})?", re.ASCII)
+_WHOLE = re.compile(r"-?\d{1,18}", re.ASCII)
+_DECIMAL = re.compile(r"-?\d{1,18}(\.\d{1,18})?([eE][-+]?\d{1,3})?", re.ASCII)
 _INSTANT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,6})?(Z|[+-]\d\d:\d\d)", re.ASCII)
 
 
@@ -63,6 +65,11 @@ class NoQuery(Query):
 
 
 Q = TypeVar("Q", bound=Query)
+
+_OF_PARAMETERS = {
+    "missing": ("missing", "This parameter is required."),
+    "extra_forbidden": ("unknown-parameter", "This operation has no such parameter."),
+}
 
 
 class ListQuery(Query):
@@ -110,17 +117,14 @@ def validate_parameters(pairs: Iterable[tuple[str, Any]], model: type[Q]) -> Q:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        faults = error.errors(include_url=False, include_context=False, include_input=False)
-        raise _problem(
-            [_error(str(fault["loc"][0]), *_wording(fault["type"], fault["msg"])) for fault in faults]
-        ) from None
+        faults = error.errors(include_url=False, include_input=False)
+        raise _problem([_error(str(fault["loc"][0]), *_wording(fault)) for fault in faults]) from None
 
 
-def _wording(kind: str, message: str) -> tuple[str, str]:
-    if kind == "extra_forbidden":
-        return "This operation has no such parameter.", "unknown-parameter"
-    text = message.removeprefix("Value error, ")
-    return text[0].upper() + text[1:].rstrip(".") + ".", kind.replace("_", "-")
+def _wording(fault: ErrorDetails) -> tuple[str, str]:
+    own = _OF_PARAMETERS.get(fault["type"])
+    code, detail = broken_rule(fault) if own is None else own
+    return detail[0].upper() + detail[1:].rstrip(".") + ".", code
 
 
 def _error(name: str, detail: str, code: str) -> PayloadError:

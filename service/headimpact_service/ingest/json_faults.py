@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from math import isfinite
 from typing import Any, TypeVar
@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, from_json
 
+from headimpact_service.broken_rules import RULES, broken_rule
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 
 Body = TypeVar("Body", bound=BaseModel)
@@ -20,34 +21,6 @@ MAX_MEMBERS = 5000
 MAX_POINTER = 200
 """Characters of a pointer that is given back: keys in it come from the caller."""
 
-# pydantic's error type -> (our code, the sentence; {…} are bounds that pydantic gives with the error).
-_RULES: Mapping[str, tuple[str, str]] = {
-    "missing": ("missing", "This field is required."),
-    "extra_forbidden": ("unknown-field", "This field is not known here."),
-    "finite_number": ("not-finite", "A number must be finite: NaN and Infinity are refused."),
-    "float_type": ("wrong-type", "A number is needed."),
-    "float_parsing": ("wrong-type", "A number is needed."),
-    "json_invalid": ("not-json", "Text that begins with a brace must be JSON."),
-    "int_type": ("wrong-type", "A whole number is needed."),
-    "string_type": ("wrong-type", "Text is needed."),
-    "bool_type": ("wrong-type", "true or false is needed."),
-    "list_type": ("wrong-type", "A list is needed."),
-    "dict_type": ("wrong-type", "An object is needed."),
-    "model_type": ("wrong-type", "An object is needed."),
-    "model_attributes_type": ("wrong-type", "An object is needed."),
-    "too_short": ("too-short", "At least {min_length} entries are needed."),
-    "too_long": ("too-long", "At most {max_length} entries are taken."),
-    "string_too_short": ("too-short", "At least {min_length} characters are needed."),
-    "string_too_long": ("too-long", "At most {max_length} characters are taken."),
-    "string_pattern_mismatch": ("control-character", "Control characters are refused."),
-    "literal_error": ("not-allowed", "One of these is needed: {expected}."),
-    "greater_than": ("out-of-range", "A value above {gt:g} is needed."),
-    "greater_than_equal": ("out-of-range", "A value of at least {ge:g} is needed."),
-    "less_than": ("out-of-range", "A value below {lt:g} is needed."),
-    "less_than_equal": ("out-of-range", "A value of at most {le:g} is needed."),
-    "cut_off_form": ("wrong-type", "A filter is a cut-off in Hz, CFC60, CFC180, CFC600, CFC1000 or null."),
-    "filter_form": ("wrong-type", 'A filter is "paper", "none" or an object with a cut-off for each signal.'),
-}
 _SAMPLES = frozenset({"x", "y", "z", "time_ms"})
 _OF_SAMPLES = frozenset({"float_type", "finite_number"})
 
@@ -110,10 +83,7 @@ def pointer(steps: Sequence[object]) -> str:
 
 def _payload_error(fault: ErrorDetails, document: Any) -> PayloadError:  # noqa: ANN401 - any JSON
     steps = _steps(fault, document)
-    code, sentence = _RULES.get(fault["type"], ("invalid", "The value does not fit this field."))
-    if fault["type"] == "value_error":  # raised by a validator of our own, in a sentence of our own
-        sentence = "{error}"
-    detail = sentence.format_map(fault.get("ctx", {}))
+    code, detail = broken_rule(fault)
     if code in {"too-short", "too-long"} and steps and steps[-1] in _SAMPLES:
         detail = detail.replace("entries", "samples")
     return PayloadError(detail=detail, code=code, pointer=pointer(steps))
@@ -129,7 +99,7 @@ def _later_samples(steps: list[object], document: Any) -> Iterator[PayloadError]
     for index in range(steps[-1] + 1, len(samples)):
         kind = _fault_of_sample(samples[index])
         if kind is not None:
-            code, sentence = _RULES[kind]
+            code, sentence = RULES[kind]
             yield PayloadError(detail=sentence, code=code, pointer=pointer([*steps[:-1], index]))
 
 

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
+
 from headimpact.errors import TraceError
-from headimpact_service.errors import PayloadError, Problem
+from headimpact.record_rules import broken_rules
+from headimpact.recording import Recording
+from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 
 # Codes whose index counts stamps rather than samples of a channel.
 _TIME_CODES = frozenset({"time-not-increasing", "time-jitter"})
 
 
-def trace_problem(error: TraceError) -> Problem:
-    """The 422 for a recording that breaks a rule, pointing at the signal, channel and sample as JSON names them."""
-    detail = str(error)
+def trace_problem(error: TraceError, recording: Recording) -> Problem:
+    """The 422 for a recording that breaks a rule, pointing at the signal, channel and sample as JSON names them.
+
+    `error` is the fault that stopped its preparation; the others that can be told follow it.
+    """
+    faults = {(fault.code, _pointer(fault)): str(fault) for fault in (error, *_first(broken_rules(recording)))}
+    errors = [PayloadError(detail=detail, code=code, pointer=place) for (code, place), detail in faults.items()]
     slug = "improper-rotation" if error.code == "improper-rotation" else "invalid-trace"
-    fault = PayloadError(detail=detail, code=error.code, pointer=_pointer(error))
-    return Problem(slug, detail, errors=[fault])
+    return Problem(slug, str(error), errors=errors[:MAX_ERRORS])
+
+
+def _first(faults: Iterator[TraceError]) -> Iterator[TraceError]:
+    """As many as an answer holds."""
+    return islice(faults, MAX_ERRORS)
 
 
 def _pointer(error: TraceError) -> str:

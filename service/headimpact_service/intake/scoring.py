@@ -91,7 +91,7 @@ def score_record(record: ImpactRecord, terms: Terms, device: DeviceFacts = UNKNO
     try:
         preparation = prepare(asked.record.recording)
     except TraceError as error:
-        raise trace_problem(error) from None
+        raise trace_problem(error, asked.record.recording) from None
     found = score(preparation, terms.model, incidence=terms.incidence, extra_criteria=asked.record.extra_criteria)
     return replace(asked, preparation=preparation, score=found)
 
@@ -119,7 +119,10 @@ def _prepared(results: list[Scored | Problem]) -> list[Scored | Problem]:
     for index, found in zip(members, prepare_many(recordings), strict=True):
         item = results[index]
         assert isinstance(item, Scored)
-        results[index] = trace_problem(found) if isinstance(found, TraceError) else replace(item, preparation=found)
+        if isinstance(found, TraceError):
+            results[index] = trace_problem(found, item.record.recording)
+        else:
+            results[index] = replace(item, preparation=found)
     return results
 
 

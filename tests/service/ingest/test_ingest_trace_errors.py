@@ -10,6 +10,7 @@ from ingest_files import body, codes, encoded, kinematics, signal, six_axis
 
 from headimpact.errors import TraceError
 from headimpact.preparation import prepare
+from headimpact.recording import Recording
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.impact_reading import read_impact
 from headimpact_service.ingest.trace_errors import trace_problem
@@ -21,27 +22,48 @@ def refusal(**changes: Any) -> Problem:
     record = read_impact(encoded(body(kinematics=kinematics(six_axis(), **changes))))
     with pytest.raises(TraceError) as caught:
         prepare(record.recording)
-    return trace_problem(caught.value)
+    return trace_problem(caught.value, record.recording)
 
 
 def stamped(stamps: list[float]) -> dict[str, Any]:
     return {"angular_velocity": signal("rad/s", six_axis()[:, 3:], time_ms=stamps)}
 
 
+TIMES = "/kinematics/angular_velocity/time_ms"
+
+
 @pytest.mark.parametrize(
-    ("stamps", "fault"),
+    ("stamps", "faults"),
     [
-        ([*STEADY[:20], *STEADY[19:39]], ("/kinematics/angular_velocity/time_ms/20", "time-not-increasing")),
-        (STEADY[::-1], ("/kinematics/angular_velocity/time_ms/1", "time-not-increasing")),
-        ([0.0, 0.5, *STEADY[2:]], ("/kinematics/angular_velocity/time_ms/1", "time-jitter")),
-        ([10.0 * stamp for stamp in STEADY], ("/kinematics/angular_velocity", "sample-rate")),
-        ([1e-300 * stamp for stamp in STEADY], ("/kinematics/angular_velocity", "sample-rate")),
+        ([*STEADY[:20], *STEADY[19:39]], [(f"{TIMES}/20", "time-not-increasing")]),
+        (STEADY[::-1], [(f"{TIMES}/{index}", "time-not-increasing") for index in range(1, 21)]),
+        ([0.0, 0.5, *STEADY[2:]], [(f"{TIMES}/1", "time-jitter"), (f"{TIMES}/2", "time-jitter")]),
+        ([10.0 * stamp for stamp in STEADY], [("/kinematics/angular_velocity", "sample-rate")]),
+        ([1e-300 * stamp for stamp in STEADY], [("/kinematics/angular_velocity", "sample-rate")]),
     ],
 )
-def test_stamps_that_cannot_be_used_are_pointed_at(stamps: list[float], fault: tuple[str, str]):
+def test_stamps_that_cannot_be_used_are_pointed_at(stamps: list[float], faults: list[tuple[str, str]]):
     problem = refusal(**stamped(stamps))
     assert (problem.slug, problem.status) == ("invalid-trace", 422)
-    assert codes(problem) == [fault]
+    assert codes(problem) == faults
+
+
+def test_every_rule_that_is_broken_is_told_up_to_twenty_faults():
+    samples = six_axis()
+    samples[7, 1] = samples[9, 2] = -12345.0
+    problem = refusal(
+        linear_acceleration=signal("g", samples[:, :3], time_ms=[10.0 * stamp for stamp in STEADY]),
+        angular_acceleration=signal("rad/s^2", samples[:, 3:], time_ms=[*STEADY[:20], *STEADY[19:39]]),
+    )
+    assert problem.detail.startswith("The linear acceleration must stay within 1000 g")
+    assert codes(problem) == [
+        ("/kinematics/linear_acceleration/y/7", "value-out-of-range"),
+        ("/kinematics/linear_acceleration/z/9", "value-out-of-range"),
+        ("/kinematics/linear_acceleration", "sample-rate"),
+        ("/kinematics/angular_acceleration/time_ms/20", "time-not-increasing"),
+    ]
+    samples[:, 0] = 12345.0
+    assert len(refusal(linear_acceleration=signal("g", samples[:, :3])).errors) == 20
 
 
 def test_a_sample_out_of_range_is_pointed_at_and_its_bound_named_but_not_its_value():
@@ -61,10 +83,10 @@ def test_a_record_in_which_nothing_moves_is_refused_as_a_whole():
 
 def test_a_channel_without_a_sample_is_pointed_at():
     error = TraceError("channel", "A channel.", signal="angular_velocity", channel="z")
-    assert codes(trace_problem(error)) == [("/kinematics/angular_velocity/z", "channel")]
+    assert codes(trace_problem(error, Recording())) == [("/kinematics/angular_velocity/z", "channel")]
 
 
 def test_an_improper_rotation_has_its_own_problem():
-    problem = trace_problem(TraceError("improper-rotation", "The rotation."))
+    problem = trace_problem(TraceError("improper-rotation", "The rotation."), Recording())
     assert problem.slug == "improper-rotation"
     assert codes(problem) == [("/kinematics/mounting", "improper-rotation")]
