@@ -301,7 +301,7 @@ def coefficient_comparison(name: str, model: RiskModel, active: RiskModel) -> st
             ax.errorbar(places + offset, [-b for b in curve.b], yerr=half, fmt="o", color=colour, label=version)
         ax.set(xticks=places, ylabel=f"Log odds per unit of {criterion_name(name)}")
         ax.set_xticklabels(labels)
-        ax.legend(fontsize=7.5)
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=7.5)
 
     return _svg(draw, 1, (4.6, 3.0))
 

@@ -23,7 +23,14 @@ class Finding:
 
 def findings(report: Mapping[str, Any]) -> list[Finding]:
     """The findings of a report, the most weighty first."""
-    found = [*_cohort(report), *_best(report), *_direction(report), *_update(report), *_failed(report)]
+    found = [
+        *_cohort(report),
+        *_gates(report),
+        *_best(report),
+        *_direction(report),
+        *_update(report),
+        *_failed(report),
+    ]
     order = ("warning", "note", "good")
     return sorted(found, key=lambda finding: order.index(finding.kind))
 
@@ -44,6 +51,28 @@ def _cohort(report: Mapping[str, Any]) -> Iterator[Finding]:
             f"Only {cohort['athletes_with_events']} athletes had a concussion: what was learnt may be about them "
             "rather than about heads in general.",
         )
+
+
+def _gates(report: Mapping[str, Any]) -> Iterator[Finding]:
+    """Of a scheduled fit: which gates hold its model back."""
+    gates = report.get("gates")
+    if not gates:
+        return
+    missed = [gate for gate in gates if not gate["passed"]]
+    if not missed:
+        yield Finding("good", "The model passed every gate of its schedule.")
+        return
+    named = ", ".join(_gate_name(gate) for gate in missed)
+    yield Finding(
+        "warning",
+        f"The model did not pass every gate of its schedule ({named}): it is not promoted by itself, and whoever promotes "
+        "it should know why that is right.",
+    )
+
+
+def _gate_name(gate: Mapping[str, Any]) -> str:
+    name = str(gate["gate"]).replace("_", " ")
+    return name if gate["criterion"] is None else f"{name} of {criterion_name(gate['criterion'])}"
 
 
 def _best(report: Mapping[str, Any]) -> Iterator[Finding]:

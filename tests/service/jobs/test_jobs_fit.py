@@ -423,6 +423,7 @@ class TestSchedules:
         failed = [gate for gate in held["gates"] if not gate["passed"]]
         assert failed[0]["gate"] == "events"
         assert "at least 10000 are needed" in failed[0]["detail"]
+        assert "did not pass every gate of its schedule (events" in self.page(api, held["version"])
         assert api.get("/v1/models/aliases/active").json()["version"] == "laksari-2020"
         api.delete("/v1/schedules/strict")
         lenient = {
@@ -442,6 +443,11 @@ class TestSchedules:
         active = api.get("/v1/models/aliases/active").json()
         assert active["version"] == done["version"]
         assert "Passed all gates of the schedule lenient" in active["reason"]
+        assert "The model passed every gate of its schedule." in self.page(api, done["version"])
+
+    @staticmethod
+    def page(api: Api, version: str) -> str:
+        return api.get(f"/v1/models/{version}/report", headers={"accept": "text/html"}).text
 
     def test_another_organisation_sees_no_schedule(self, api: Api, make_key: Callable[..., str]) -> None:
         api.put("/v1/schedules/weekly", json=WEEKLY)
