@@ -65,8 +65,8 @@ def _gates(report: Mapping[str, Any]) -> Iterator[Finding]:
     named = ", ".join(_gate_name(gate) for gate in missed)
     yield Finding(
         "warning",
-        f"The model did not pass every gate of its schedule ({named}): it is not promoted by itself, and whoever promotes "
-        "it should know why that is right.",
+        f"The model did not pass every gate of its schedule ({named}): it is not promoted by itself, and whoever "
+        "promotes it should know why that is right.",
     )
 
 
