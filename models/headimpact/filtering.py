@@ -15,6 +15,7 @@ from math import atan, pi, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dtbtrs
 
 from headimpact.published import FILTERS
 
@@ -66,8 +67,10 @@ def corner_frequency(cut_off: float | str, sample_rate_hz: float) -> float | Non
 def low_pass(x: FloatArray, corner_hz: float, sample_rate_hz: float) -> FloatArray:
     """Filter every record forward and backward.
 
-    Equal to ``scipy.signal.sosfiltfilt`` of ``butter(2, corner_hz)`` with odd extension by min(9, n - 1) samples; the
-    design is kept between calls, which is most of that function's cost.
+    Equal to ``scipy.signal.sosfiltfilt`` of ``butter(2, corner_hz)`` with odd extension by min(9, n - 1) samples. The
+    recursion y[i] + a1 y[i-1] + a2 y[i-2] = r[i] is a triangular system of three bands, which LAPACK solves record by
+    record, and its transpose is the backward pass: as fast as that function's own filter, without the second and the
+    50 MB that importing ``scipy.signal`` costs each process.
 
     Parameters
     ----------
@@ -78,23 +81,49 @@ def low_pass(x: FloatArray, corner_hz: float, sample_rate_hz: float) -> FloatArr
     sample_rate_hz
         Samples per second [Hz].
     """
-    from scipy import signal  # its import costs more than all else here: only who filters waits for it
-
-    b, a, zi = _design(corner_hz, sample_rate_hz)
-    margin = min(9, x.shape[-1] - 1)
-    extended = _odd_extension(x, margin)
-    forward, _ = signal.lfilter(b, a, extended, zi=zi * extended[..., :1])
-    backward, _ = signal.lfilter(b, a, forward[..., ::-1], zi=zi * forward[..., -1:])
-    filtered: FloatArray = backward[..., ::-1][..., margin : margin + x.shape[-1]]
+    n = x.shape[-1]
+    margin = min(9, n - 1)
+    extended = _odd_extension(x, margin).reshape(-1, n + 2 * margin)
+    design = _design(corner_hz, sample_rate_hz)
+    bands = _bands(design, extended.shape[1])
+    forward, _ = dtbtrs(bands, _driven(design, extended).T, uplo="L", diag="U", overwrite_b=True)
+    mirrored = _driven(design, forward.T[:, ::-1])[:, ::-1]
+    backward, _ = dtbtrs(bands, mirrored.T, uplo="L", trans="T", diag="U", overwrite_b=True)
+    filtered: FloatArray = backward.T[:, margin : margin + n].reshape(x.shape)
     return filtered
 
 
-@lru_cache(maxsize=256)
-def _design(corner_hz: float, sample_rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    from scipy import signal
+Design = tuple[float, float, float]
+"""b0, a1 and a2 of y[i] + a1 y[i-1] + a2 y[i-2] = b0 (x[i] + 2 x[i-1] + x[i-2])."""
 
-    b, a = signal.butter(2, corner_hz, fs=sample_rate_hz)
-    return b, a, signal.lfilter_zi(b, a)
+
+@lru_cache(maxsize=256)
+def _design(corner_hz: float, sample_rate_hz: float) -> Design:
+    """Two Butterworth poles through the bilinear transform, the corner kept in its place."""
+    k = tan(pi * corner_hz / sample_rate_hz)
+    scale = 1.0 + sqrt(2.0) * k + k * k
+    return k * k / scale, 2.0 * (k * k - 1.0) / scale, (1.0 - sqrt(2.0) * k + k * k) / scale
+
+
+@lru_cache(maxsize=16)
+def _bands(design: Design, samples: int) -> FloatArray:
+    """The triangular matrix of the recursion, as LAPACK takes its diagonals."""
+    _, a1, a2 = design
+    bands = np.empty((3, samples), order="F")
+    bands[0], bands[1], bands[2] = 1.0, a1, a2
+    return bands
+
+
+def _driven(design: Design, x: FloatArray) -> FloatArray:
+    """What drives the recursion: b0 (x[i] + 2 x[i-1] + x[i-2]), as if the first sample had stood before it for ever."""
+    b0, _, a2 = design
+    pairs = x[:, 1:] + x[:, :-1]
+    driven = np.empty_like(x)
+    np.add(pairs[:, 1:], pairs[:, :-1], out=driven[:, 2:])
+    driven *= b0
+    driven[:, 0] = x[:, 0]
+    driven[:, 1:2] = b0 * x[:, 1:2] + (3.0 * b0 - a2) * x[:, :1]
+    return driven
 
 
 def _odd_extension(x: FloatArray, count: int) -> FloatArray:

@@ -41,6 +41,8 @@ from headimpact.uniform import Layout, Uniform, uniform
 # Impacts that are worked on at once: enough to spread NumPy's cost per call, few enough to stay in the processor's
 # cache.
 BLOCK = 128
+# Samples of one component in a block: a few of the longest records fill the cache alone, and take their memory.
+BLOCK_SAMPLES = 40_000
 
 Tracks = dict[SignalName, FloatArray]
 
@@ -98,10 +100,16 @@ def prepare_many(recordings: Iterable[Recording]) -> list[Preparation | TraceErr
         else:
             alike.setdefault(sent.layout, []).append((number, sent))
     for layout, members in alike.items():
-        for first in range(0, len(members), BLOCK):
-            numbers, block = zip(*members[first : first + BLOCK], strict=True)
+        size = _block_size(max(signal.track.samples for signal in layout.signals))
+        for first in range(0, len(members), size):
+            numbers, block = zip(*members[first : first + size], strict=True)
             found |= zip(numbers, _prepared(plan_of(layout), block), strict=True)
     return [found[number] for number in range(len(found))]
+
+
+def _block_size(samples: int) -> int:
+    """How many records of this length are worked on at once."""
+    return max(1, min(BLOCK, BLOCK_SAMPLES // samples))
 
 
 def _prepared(plan: Plan, block: Sequence[Uniform]) -> list[Preparation | TraceError]:
@@ -282,8 +290,9 @@ def blocks_of(preparations: Sequence[Preparation]) -> Iterator[Block]:
     for members in together.values():
         yield Block(_chosen(preparations[members[0]].motion, [preparations[i].place for i in members]), members)
     for members in alone.values():
-        for first in range(0, len(members), BLOCK):
-            block = members[first : first + BLOCK]
+        size = _block_size(preparations[members[0]].motion.samples)
+        for first in range(0, len(members), size):
+            block = members[first : first + size]
             yield Block(_joined([preparations[i].motion for i in block]), block)
 
 

@@ -6,7 +6,6 @@ import io
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -18,8 +17,9 @@ from headimpact_service.cli.faults import USAGE, problem_line
 from headimpact_service.cli.score import with_mapping
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
-from headimpact_service.ingest.upload import read_upload
+from headimpact_service.ingest.upload import read_upload, sample_count
 from headimpact_service.intake.importing import COUNTED, look_up, make_ready, preview_row, score_found, store, summary
+from headimpact_service.intake.parts import parts
 from headimpact_service.intake.registry import active_model
 from headimpact_service.intake.scoring import Terms, terms_of
 from headimpact_service.store import organisation_settings, organisations
@@ -132,8 +132,7 @@ def _import(
     try:
         total = sum(1 for _ in read_upload(content, options))
         rows: list[dict[str, Any]] = []
-        found = read_upload(content, options)
-        while part := list(islice(found, CHUNK)):
+        for part in parts(read_upload(content, options), sample_count, CHUNK):
             rows += _chunk(database, target, part, len(rows), dry_run=dry_run)
             advance(total, len(rows))
     except Problem as problem:

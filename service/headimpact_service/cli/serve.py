@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import socket
 from typing import Any
 
@@ -35,7 +34,6 @@ def run(*, host: str | None, port: int | None, database_url: str | None) -> None
         for warning in database.warnings():
             say(f"Warning: {warning}")
         app = create_app(settings, database, engine_of(settings, database))
-        importlib.import_module("scipy.signal")  # or the first filtered impact would wait for it
         memory.spare_the_collector()
         serve_until_stopped(app, settings, listener, lambda: say(f"Listening on {address} (documentation: /docs)"))
 

@@ -60,6 +60,11 @@ class ImpactRecord:
     include: tuple[str, ...] = ()
     extra_criteria: tuple[str, ...] = ()
 
+    @property
+    def values(self) -> int:
+        """The samples of all its channels."""
+        return sum(signal.values.size for _, signal in self.recording.signals())
+
 
 class RefusedImpact(Problem):
     """The problem of one impact of a file, with the sender's name for it where that could be read."""

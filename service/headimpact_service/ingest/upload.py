@@ -57,7 +57,7 @@ def read_upload(content: bytes | Path, options: ImportOptions) -> Impacts:
 
 def sample_count(item: ImpactRecord | Problem) -> int:
     """The samples of all channels of an impact."""
-    return 0 if isinstance(item, Problem) else sum(signal.values.size for _, signal in item.recording.signals())
+    return 0 if isinstance(item, Problem) else item.values
 
 
 def _read_csv(source: Source, options: ImportOptions) -> Impacts:

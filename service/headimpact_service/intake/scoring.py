@@ -25,6 +25,7 @@ from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.digest import input_digest
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.trace_errors import trace_problem
+from headimpact_service.intake.parts import parts
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,10 @@ class DeviceFacts:
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """A record with its score; `score` and `preparation` are None where it must not be scored."""
+    """A record with its score, which is None where it must not be scored.
+
+    `preparation`, the motion that was scored, is None there too, and where many were scored together.
+    """
 
     record: ImpactRecord
     terms: Terms
@@ -74,6 +78,8 @@ class Scored:
 
 
 UNKNOWN_DEVICE = DeviceFacts()
+TOGETHER = 1000
+"""Records that are prepared and scored together, at most."""
 NOT_WORN = QualityNote("not_worn", "note", "The device reports that it was not worn.")
 
 
@@ -96,8 +102,24 @@ def score_record(record: ImpactRecord, terms: Terms, device: DeviceFacts = UNKNO
     return replace(asked, preparation=preparation, score=found)
 
 
-def score_records(records: Sequence[tuple[ImpactRecord, DeviceFacts]], terms: Terms) -> list[Scored | Problem]:
-    """Score many records together, with the same digits as one by one; what is wrong with one stands in its place."""
+def score_records(records: Iterable[tuple[ImpactRecord, DeviceFacts]], terms: Terms) -> list[Scored | Problem]:
+    """Score many records together, with the same digits as one by one; what is wrong with one stands in its place.
+
+    What they hold in memory beside the records is bounded: they are taken part by part, and their motion is let go.
+    """
+    return [
+        replace(item, preparation=None) if isinstance(item, Scored) else item
+        for part in parts(records, _values, TOGETHER)
+        for item in _scored(part, terms)
+    ]
+
+
+def _values(pair: tuple[ImpactRecord, DeviceFacts]) -> int:
+    return pair[0].values
+
+
+def _scored(records: Sequence[tuple[ImpactRecord, DeviceFacts]], terms: Terms) -> list[Scored | Problem]:
+    """A part of them, each with its preparation."""
     results = _prepared([_asked_or_problem(record, terms, device) for record, device in records])
     batches: dict[tuple[str, ...], list[int]] = {}
     for index, item in enumerate(results):

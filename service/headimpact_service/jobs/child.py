@@ -41,6 +41,7 @@ def _last_word(conn: Connection, task: str, arguments: dict[str, Any]) -> tuple[
     try:
         loaded = _load(task)
         memory.spare_the_collector()
+        memory.let_go_of_code()
         conn.send(("begins", None))
         for value in loaded(arguments):
             conn.send(("value", value))

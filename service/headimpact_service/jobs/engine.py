@@ -122,6 +122,7 @@ class Engine:
 
         launched = Transact(self._records(), slot.name, self._run, at_once=self._at_once)
         memory.spare_the_collector()
+        memory.let_go_of_code()
         return launched
 
     def _records(self) -> URL:

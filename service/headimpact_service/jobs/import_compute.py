@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
-from headimpact_service.ingest.upload import read_upload
+from headimpact_service.ingest.upload import read_upload, sample_count
 from headimpact_service.intake.importing import Ready, look_up, make_ready, score_found
+from headimpact_service.intake.parts import parts
 from headimpact_service.intake.registry import DEFAULT, model_of
 from headimpact_service.intake.scoring import Terms, terms_of
 from headimpact_service.store.database import Database
@@ -53,12 +53,10 @@ def _chunks(
     database: Database, found: Iterator[Any], size: int, terms: Terms, arguments: dict[str, Any]
 ) -> Iterator[Chunk]:
     data_set_id, key_id = arguments["data_set_id"], arguments["key_id"]
-    for number in count():
-        part = list(islice(found, size))
-        if not part:
-            return
-        if number < arguments["first"]:
-            continue
-        with database.read() as conn:
-            known = look_up(conn, data_set_id, part)
-        yield Chunk(number, number * size, make_ready(score_found(part, known, terms), key_id))
+    first = 0
+    for number, part in enumerate(parts(found, sample_count, size)):
+        if number >= arguments["first"]:
+            with database.read() as conn:
+                known = look_up(conn, data_set_id, part)
+            yield Chunk(number, first, make_ready(score_found(part, known, terms), key_id))
+        first += len(part)

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.cohorts import filter_of
+from headimpact_service.intake.parts import parts
 from headimpact_service.intake.records import rebuild_record
 from headimpact_service.intake.registry import model_of
 from headimpact_service.intake.rendering import new_score
-from headimpact_service.intake.scoring import UNKNOWN_DEVICE, Terms, score_records, terms_of
+from headimpact_service.intake.scoring import TOGETHER, UNKNOWN_DEVICE, Terms, score_records, terms_of
 from headimpact_service.store import cohorts, impacts, traces
 from headimpact_service.store.database import Database
 from headimpact_service.store.score_rows import NewScore
@@ -65,12 +67,23 @@ def _scored(
     number: int, last: bytes, revisions: dict[bytes, int], stored: dict[bytes, tuple[Any, bytes]], terms: Terms
 ) -> Rescored:
     """The revision that was scored tells whether an impact was corrected meanwhile."""
-    members = sorted(stored)
-    records = [rebuild_record(stored[impact][0], traces.decode(stored[impact][1])) for impact in members]
-    found = score_records([(record, UNKNOWN_DEVICE) for record in records], terms)
-    scores = [
-        (impact, revisions[impact], new_score(item))
-        for impact, item in zip(members, found, strict=True)
-        if not isinstance(item, Problem)
-    ]
-    return Rescored(number, last, scores, len(members) - len(scores))
+    records = (
+        (impact, rebuild_record(stored[impact][0], traces.decode(stored[impact][1]))) for impact in sorted(stored)
+    )
+    scores: list[tuple[bytes, int, NewScore]] = []
+    for part in parts(records, _values, TOGETHER):
+        found = score_records([(record, UNKNOWN_DEVICE) for _, record in part], terms)
+        scores += [
+            (impact, revisions[impact], new_score(item))
+            for (impact, _), item in zip(part, found, strict=True)
+            if not isinstance(item, Problem)
+        ]
+    return Rescored(number, last, scores, len(stored) - len(scores))
+
+
+def _record(document: Any, trace: bytes) -> ImpactRecord:  # noqa: ANN401 - a document of the store
+    return rebuild_record(document, traces.decode(trace))
+
+
+def _values(member: tuple[bytes, ImpactRecord]) -> int:
+    return member[1].values
