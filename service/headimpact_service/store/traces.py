@@ -2,7 +2,7 @@
 
 The first byte names the codec: a table of names, forms and shapes, then all arrays as one Zstandard frame (codec 2) or
 zlib stream (codec 1, which is read only). Each array is stored in the first of three forms that gives every bit of it
-back: float32; whole multiples of 10^-d, as JSON and CSV write samples, as int32 differences from sample to sample;
+back: whole multiples of 10^-d, as JSON and CSV write samples, as int32 differences from sample to sample; float32;
 float64. Component by component (n x 3 as 3 x n), its bytes transposed so that bytes of equal weight stand together and
 compress.
 """
@@ -31,7 +31,6 @@ DECIMAL = 16
 """The form of multiples of 10^-d is this plus d."""
 DIGITS = (2, 4, 6)
 _GLANCE = 8
-_LARGEST = 2.0**31 - 1
 
 
 class TraceCodecError(ValueError):
@@ -59,17 +58,16 @@ def encode(signals: Mapping[str, FloatArray]) -> bytes:
 
 
 def _stored(values: FloatArray) -> _Stored:
-    """The values in the smallest form from which every bit comes back."""
+    """The values in the smallest form from which every bit comes back: what is written in decimals is no float32."""
     rows = np.ascontiguousarray(values.T)
+    digits = _digits(rows)
+    if digits is not None:
+        whole = np.rint(rows * 10.0**digits).astype(np.int32)
+        if _same_bits(whole / 10.0**digits, rows):  # neither -0.0 nor a multiple beyond int32 comes back
+            return _Stored(DECIMAL + digits, values.shape, _differences(whole))
     single = rows.astype(np.float32)
     if _same_bits(single.astype(np.float64), rows):
         return _Stored(SINGLE, values.shape, single.reshape(-1))
-    digits = _digits(rows)
-    if digits is not None:
-        multiples = np.rint(rows * 10.0**digits)
-        multiples += 0.0  # whole numbers know no -0.0
-        if _same_bits(multiples / 10.0**digits, rows) and np.abs(multiples).max(initial=0.0) <= _LARGEST:
-            return _Stored(DECIMAL + digits, values.shape, _differences(multiples.astype(np.int32)))
     return _Stored(DOUBLE, values.shape, rows.reshape(-1))
 
 
@@ -80,7 +78,7 @@ def _digits(rows: FloatArray) -> int | None:
 
 
 def _same_bits(found: FloatArray, values: FloatArray) -> bool:
-    return bool((found.view(np.uint64) == values.view(np.uint64)).all())
+    return found.tobytes() == values.tobytes()
 
 
 def _differences(whole: NDArray[np.int32]) -> NDArray[np.int32]:
