@@ -27,6 +27,10 @@ REQUIRED = ("athlete_id", "outcome")
 READ_TOO = ("id", "revision", "event", "athlete_consent", "worn")
 PARQUET_MAGIC = b"PAR1"
 GZIP_MAGIC = b"\x1f\x8b"
+NOTHING = frozenset({"", "NA"})
+"""Cells without a value; R writes the second."""
+TRUTHS = {"true": "1", "false": "0"}
+"""Outcomes of data frames whose column is logical, whatever their case."""
 FORMULA_GUARD = "'"
 """What our export puts before a cell that a spreadsheet would take for a formula."""
 
@@ -210,8 +214,9 @@ def _text(cell: Any) -> str:  # noqa: ANN401 - a cell of any type
 
 
 def _outcome(cell: Any, row: int) -> float | None:  # noqa: ANN401 - a cell of any type
+    word = _text(cell)
     try:
-        return outcome_of(_text(cell))
+        return outcome_of("" if word in NOTHING else TRUTHS.get(word.lower(), word))
     except CalibrationError as error:
         raise TableError(f"Row {row}, column outcome: {error}") from None
 
@@ -251,7 +256,7 @@ def _numbers(columns: Mapping[str, Sequence[Any]], name: str, rows: Sequence[int
     found = np.empty(len(rows))
     for i, row in enumerate(rows):
         cell = columns[name][row]
-        if cell is None or cell == "":
+        if cell is None or cell in NOTHING:
             found[i] = nan
             continue
         try:

@@ -190,6 +190,26 @@ class TestTables:
         run("refit", "--table", "t.csv", "--out", "out", "--replicas", "10", "--include", "unverified")
         assert json.loads((tmp_path / "out/report.json").read_text())["cohort"]["n"] == 115
 
+    @pytest.mark.parametrize(
+        "words", [("FALSE", "TRUE"), ("False", "True"), ("0.0", "1.0"), ("no_concussion", "concussion")]
+    )
+    def test_tables_of_r_and_of_data_frames_give_the_same_fit(
+        self, tmp_path: Path, run: Run, words: tuple[str, str]
+    ) -> None:
+        """A logical or decimal outcome, and NA where there is no value."""
+        columns = simulated()
+        columns["hic15"] = [None if i % 7 == 0 else 10.0 + i % 50 for i in range(120)]
+        write(tmp_path / "ours.csv", columns)
+        columns["outcome"] = [words[outcome] for outcome in columns["outcome"]]
+        columns["hic15"] = ["NA" if value is None else value for value in columns["hic15"]]
+        write(tmp_path / "theirs.csv", columns)
+        fits = []
+        for name in ("ours", "theirs"):
+            code, _, error = run("refit", "--table", f"{name}.csv", "--out", name, "--replicas", "10")
+            assert (code, error) == (0, "")
+            fits.append(json.loads((tmp_path / name / "report.json").read_text())["criteria"])
+        assert fits[0] == fits[1]
+
     def test_criteria_joined_by_a_plus_are_fitted_together(self, tmp_path: Path, run: Run) -> None:
         columns = simulated()
         columns["hic15"] = np.random.default_rng(3).gamma(2.0, 20.0, 120).tolist()
