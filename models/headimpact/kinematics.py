@@ -188,9 +188,13 @@ def squared_norm(x: FloatArray) -> FloatArray:
 
     Written component by component: the same operations in the same order for one impact and for a block of many.
     """
-    squares = x * x
-    total: FloatArray = squares[..., 0, :] + squares[..., 1, :]
-    total += squares[..., 2, :]
+    return summed_over_axes(x * x)
+
+
+def summed_over_axes(x: FloatArray) -> FloatArray:
+    """x + y + z, of the second-last dimension, always in this order."""
+    total: FloatArray = x[..., 0, :] + x[..., 1, :]
+    total += x[..., 2, :]
     return total
 
 

@@ -165,3 +165,22 @@ def test_random_records_of_many_lengths_and_rates_equal_a_40_digit_solution(seed
     rate_hz, samples = float(generator.uniform(500, 20_000)), int(generator.integers(3, 20_001))
     alpha = generator.normal(0, 10 ** generator.uniform(0, 5), (samples, 3))
     assert relative_error(brain_angle_history(alpha, rate_hz), exact_histories(alpha, rate_hz)) < 1e-12
+
+
+@given(st.integers(0, 10_000), st.floats(1e-6, 1e6))
+@settings(deadline=None, max_examples=50)
+def test_peaks_are_the_largest_samples_of_the_history_to_the_last_bit(seed, scale):
+    alpha = np.random.default_rng(seed).normal(size=(60, 3)) * scale
+    history = brain_angle_history(alpha, 1000.0)
+    components, resultant = peak_brain_angles(alpha, 1000.0)
+    assert components.tolist() == np.abs(history).max(axis=0).tolist()
+    assert resultant == pytest.approx(np.linalg.norm(history, axis=1).max(), rel=1e-15)
+
+
+def test_more_impacts_than_a_block_holds_have_the_peaks_of_each():
+    alpha = np.random.default_rng(5).normal(size=(12_000, 3, 19)) * 500
+    together, resultants = peak_brain_angles(alpha, 10_000.0)
+    for impact in range(19):
+        components, resultant = peak_brain_angles(np.ascontiguousarray(alpha[..., impact]), 10_000.0)
+        np.testing.assert_array_equal(together[:, impact], components)
+        assert resultants[impact] == resultant
