@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import zlib
 from collections.abc import AsyncGenerator, Iterable, Iterator
+from contextlib import suppress
 from typing import TypeVar
 
 from pydantic import BaseModel
@@ -19,6 +20,9 @@ Model = TypeVar("Model", bound=BaseModel)
 
 SLOWEST_BYTES_PER_S = 16 * 1024
 """A client that keeps up this rate is never given up, however large its body."""
+
+MAX_DISCARDED = 64 * 1024 * 1024
+"""Bytes beyond the bound that are taken and dropped, so that their sender hears why."""
 
 MAX_MEMBERS = 64
 """Of one gzip body: thousands of empty members would cost seconds and inflate to nothing."""
@@ -41,40 +45,30 @@ def require_media_type(request: Request, accepted: Iterable[str], named: Iterabl
 
 
 async def read_body(request: Request, limit: int, slug: str = "body-too-large") -> bytes:
-    """The whole body, inflated if it is gzip; 413 as soon as it, sent or inflated, passes `limit` bytes."""
-    body = _Body(request, limit, slug)
-    parts: list[bytes] = []
-    try:
-        async with asyncio.timeout_at(body.deadline) as patience:
-            while body.more:
-                parts += body.take(await request.receive())
-                if body.more:
-                    patience.reschedule(body.deadline)
-    except TimeoutError:
-        raise _given_up() from None
+    """The whole body, inflated if it is gzip; 413 where it, sent or inflated, passes `limit` bytes."""
+    parts = [part async for part in body_parts(request, limit, slug)]
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
 async def body_parts(request: Request, limit: int, slug: str) -> AsyncGenerator[bytes, None]:
     """The same as it arrives, in parts of bounded size."""
     body = _Body(request, limit, slug)
-    while body.more:
-        try:
-            async with asyncio.timeout_at(body.deadline):
-                message = await request.receive()
-        except TimeoutError:
-            raise _given_up() from None
-        for part in body.take(message):
-            yield part
+    try:
+        body.require_size()
+        while body.more:
+            for part in body.take(await body.next_message()):
+                yield part
+    except Problem as problem:
+        if problem.slug == slug:
+            await body.discard()
+        raise
 
 
 class _Body:
     """A body as it arrives, within its bounds of size and time."""
 
     def __init__(self, request: Request, limit: int, slug: str) -> None:
-        declared = request.headers.get("content-length", "")
-        if declared.isdigit() and int(declared) > limit:
-            raise _too_large(limit, slug)
+        self._request = request
         self.limit, self.slug = limit, slug
         self.received, self.more = 0, True
         self._inflate = _inflater(request, limit, slug)
@@ -84,6 +78,25 @@ class _Body:
     def deadline(self) -> float:
         """When the next bytes must be there, on the loop's clock."""
         return float(self._until + self.received / SLOWEST_BYTES_PER_S)
+
+    @property
+    def declared(self) -> int:
+        """How many bytes the client says that it sends; 0 where it does not."""
+        length = self._request.headers.get("content-length", "")
+        return int(length) if length.isdigit() else 0
+
+    def require_size(self) -> None:
+        """Refuse a body that is declared to be too large."""
+        if self.declared > self.limit:
+            raise _too_large(self.limit, self.slug)
+
+    async def next_message(self) -> Message:
+        """What the server brings next; 408 where that does not come in time."""
+        try:
+            async with asyncio.timeout_at(self.deadline):
+                return await self._request.receive()
+        except TimeoutError:
+            raise _given_up() from None
 
     def take(self, message: Message) -> Iterable[bytes]:
         """What one message of the server brings, inflated."""
@@ -96,13 +109,28 @@ class _Body:
             raise _too_large(self.limit, self.slug)
         return (chunk,) if self._inflate is None else self._inflate.feed(chunk, more=self.more)
 
+    async def discard(self) -> None:
+        """Take what is left of a refused body and drop it: a client that is still sending hears no answer.
+
+        What is far larger, or comes too slowly, is cut off. A client that asked whether it may send is told at once.
+        """
+        most = self.limit + MAX_DISCARDED
+        if self.declared > most or (not self.received and "expect" in self._request.headers):
+            return
+        with suppress(TimeoutError):
+            async with asyncio.timeout_at(self.deadline):
+                while self.more and self.received <= most:
+                    message = await self._request.receive()
+                    self.more = message.get("more_body", False)
+                    self.received += len(message.get("body", b""))
+
 
 def _given_up() -> Problem:
     return Problem("request-timeout", "The body did not arrive in time.", headers={"Connection": "close"})
 
 
 def _too_large(limit: int, slug: str) -> Problem:
-    # The rest of the body is not worth reading: the connection ends with the answer.
+    # The rest of the body may not have been read: the connection ends with the answer.
     return Problem(slug, f"The body may have at most {limit} bytes.", headers={"Connection": "close"})
 
 

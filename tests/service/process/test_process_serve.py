@@ -108,6 +108,25 @@ class TestStalledClients:
                 assert client.post("/v1/score", content=b" " * size, headers=headers).status_code == 413
             assert client.get("/livez").status_code == 200
 
+    @pytest.mark.parametrize("size", [8 * 1024 * 1024 + 1, 40_000_000])
+    def test_a_client_that_sends_everything_before_it_listens_hears_413(self, impatient: Service, size: int) -> None:
+        head = f"POST /v1/score HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {impatient.key}\r\n"
+        head += f"Content-Type: application/json\r\nContent-Length: {size}\r\n\r\n"
+        with socket.create_connection(("127.0.0.1", impatient.port), timeout=20) as connection:
+            connection.sendall(head.encode() + b" " * size)
+            answer = received(connection)
+        assert answer.startswith(b"HTTP/1.1 413 ")
+        assert b"at most 8388608 bytes" in answer
+
+    @pytest.mark.parametrize("asks", ["", "Expect: 100-continue\r\n"])
+    def test_a_body_that_is_far_too_large_is_refused_before_it_is_sent(self, impatient: Service, asks: str) -> None:
+        size = 10_000_000 if asks else 2_000_000_000
+        head = f"POST /v1/score HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {impatient.key}\r\n{asks}"
+        head += f"Content-Type: application/json\r\nContent-Length: {size}\r\n\r\n"
+        with socket.create_connection(("127.0.0.1", impatient.port), timeout=20) as connection:
+            connection.sendall(head.encode())
+            assert received(connection).startswith(b"HTTP/1.1 413 ")
+
 
 def received(connection: socket.socket) -> bytes:
     """Everything until the other side closes."""
