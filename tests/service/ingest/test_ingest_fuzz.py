@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import random
 import time
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +15,9 @@ import pytest
 from binary_files import arrow, mat, nested, noise, npz, parquet, structs, wide, xlsx
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ingest_files import GENERIC, body, csv_text, encoded, outcome, six_axis, statuses
+from ingest_files import GENERIC, body, csv_text, encoded, outcome, six_axis, statuses, zipped
+from laboratory import DTS_COLUMNS, dts, iso_mme
+from making import nhtsa
 
 MAX_SECONDS = 5.0
 STRUCT = structs({"t": np.arange(20.0)[:, None] / 1000, "lin_acc_CG": np.ones((20, 3)), "ang_vel": np.ones((20, 3))})
@@ -30,7 +34,11 @@ FILES: dict[str, tuple[bytes, dict[str, Any]]] = {
     "mat, structs": (mat({"impact": STRUCT}, do_compression=True), {"preset": "stanford_mat"}),
     "xlsx": (xlsx({"Summary": [["a", "b"], [1.0, 2.0]], "event": SHEET}), {}),
     "csv": (csv_text(six_axis(24), before={"external_id": '"a"'}).encode(), {}),
+    "json": (encoded(body()), {}),
     "ndjson": (encoded(body()) + b"\n" + encoded(body(external_id="b")), {}),
+    "dts": (dts(DTS_COLUMNS, samples=200, length=60).encode(), {}),
+    "iso-mme": (iso_mme(), {}),
+    "nhtsa": (nhtsa().data, {}),
 }
 formats = pytest.mark.parametrize("name", FILES)
 
@@ -79,8 +87,17 @@ DAMAGES: tuple[Callable[[bytearray, random.Random], None], ...] = (cut, flip, ov
 
 
 def damaged(data: bytes, seed: int) -> bytes:
-    """The file with one to three damages, the same for the same seed."""
+    """The file with one to three damages, the same for the same seed; of a zip archive often one member of it."""
     rng = random.Random(seed)
+    if data[:4] == b"PK\3\4" and rng.random() < 0.75:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+        name = rng.choice(list(members))
+        return zipped(members | {name: _damaged(members[name], rng)})
+    return _damaged(data, rng)
+
+
+def _damaged(data: bytes, rng: random.Random) -> bytes:
     changed = bytearray(data)
     for _ in range(rng.randint(1, 3)):
         if changed:
