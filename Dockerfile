@@ -10,18 +10,20 @@ FROM python:3.11-slim-trixie AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
 WORKDIR /build
 
-# The environment that is copied holds no pip; the image's own fills it, by hash and from wheels only.
+# The environment that is copied holds no pip; the image's own fills it, by hash and from wheels only. The locks are
+# complete: without --no-deps pip would ask for a pin of each extra that a package names beside the package's own.
 COPY requirements.lock requirements-build.lock ./
 RUN python -m venv --without-pip /opt/headimpact \
-    && pip --python /opt/headimpact/bin/python install --require-hashes --only-binary :all: --requirement requirements.lock \
-    && pip install --require-hashes --only-binary :all: --requirement requirements-build.lock
+    && pip --python /opt/headimpact/bin/python install --no-deps --require-hashes --only-binary :all: --requirement requirements.lock \
+    && pip install --no-deps --require-hashes --only-binary :all: --requirement requirements-build.lock
 
 COPY LICENSE README.md pyproject.toml ./
 COPY migrations migrations
 COPY models models
 COPY service service
 RUN pip wheel --no-index --no-deps --no-build-isolation --wheel-dir /build/dist . \
-    && pip --python /opt/headimpact/bin/python install --no-index --no-deps /build/dist/*.whl
+    && pip --python /opt/headimpact/bin/python install --no-index --no-deps /build/dist/*.whl \
+    && pip --python /opt/headimpact/bin/python check
 
 
 FROM python:3.11-slim-trixie

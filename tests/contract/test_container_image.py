@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatch
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.metadata import version
+from importlib.metadata import requires, version
 
 import pytest
 from documents import ROOT, text
@@ -72,6 +72,29 @@ def test_the_tests_run_with_the_versions_that_are_locked() -> None:
     assert different == []
 
 
+def needs(requirement: Requirement) -> list[Requirement]:
+    """What a package needs here, with the extras that are asked for."""
+    found = [Requirement(line) for line in requires(requirement.name) or ()]
+    chosen = [{"extra": extra} for extra in ("", *requirement.extras)]
+    return [one for one in found if one.marker is None or any(one.marker.evaluate(each) for each in chosen)]
+
+
+def test_the_lock_holds_all_that_its_packages_need() -> None:
+    """They are installed without looking for more."""
+    names = {canonicalize_name(pin.name) for pin in locked("requirements.lock")}
+    project = PYPROJECT["project"]
+    waiting = [Requirement(line) for line in (*project["dependencies"], *project["optional-dependencies"]["files"])]
+    seen: set[tuple[str, frozenset[str]]] = set()
+    while waiting:
+        requirement = waiting.pop()
+        key = canonicalize_name(requirement.name), frozenset(requirement.extras)
+        assert key[0] in names, requirement
+        if key not in seen:
+            seen.add(key)
+            waiting += needs(requirement)
+    assert len({name for name, _ in seen}) > 40
+
+
 def test_the_build_lock_is_compiled_from_what_the_build_needs() -> None:
     assert PYPROJECT["dependency-groups"]["build"] == PYPROJECT["build-system"]["requires"]
 
@@ -113,10 +136,12 @@ def test_both_stages_begin_with_one_image_of_a_python_that_the_project_takes() -
 
 def test_everything_is_installed_by_hash_from_the_locks_or_without_an_index() -> None:
     commands = [command.strip() for line in of(BUILD, "RUN") for command in line.split("&&")]
-    installs = [command for command in commands if command.startswith("pip ")]
+    *installs, check = [command for command in commands if command.startswith("pip ")]
+    assert check.endswith(" check")
     assert len(installs) == 4
     for install in installs:
-        assert "--no-index --no-deps" in install or "--require-hashes --only-binary :all:" in install, install
+        assert "--no-deps" in install, install
+        assert "--no-index" in install or "--require-hashes --only-binary :all:" in install, install
     for lock in LOCKS:
         assert any(f"--requirement {lock}" in install for install in installs)
 

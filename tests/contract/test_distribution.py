@@ -69,4 +69,4 @@ def test_the_environment_of_the_image_holds_no_installer_and_no_tool_of_developm
     command = [str(installed / "python"), "-c", listing]
     names = subprocess.run(command, capture_output=True, check=True, text=True).stdout.split()
     assert "headimpact" in names
-    assert {"pip", "hatchling", "pytest", "fastapi"}.isdisjoint(names)
+    assert {"pip", "hatchling", "pytest", "ruff"}.isdisjoint(names)
