@@ -109,6 +109,8 @@ def _require_harmless(entry: zipfile.ZipInfo) -> None:
         raise _unreadable("A zip archive's files are stored or deflated; other methods are not read.")
     if stat.S_ISLNK(entry.external_attr >> 16):
         raise _unreadable("A zip archive may hold no links.")
+    if not entry.filename:
+        raise _unreadable("Each file of a zip archive has a name.")
     if _leads_out(entry.orig_filename):
         raise _unreadable("A path in the zip archive leads out of it.")
     if entry.file_size > MAX_ENTRY:

@@ -47,6 +47,14 @@ def test_a_path_that_leads_out_is_refused(name: str):
     assert "leads out" in detail_of(zipped({name: "x"}))
 
 
+def test_an_entry_without_a_name_is_refused():
+    data = bytearray(zipped({"a": "x"}))
+    directory = data.index(b"PK\x01\x02")
+    data[directory + 28 : directory + 30] = b"\0\0"  # the length of its name, which then counts as a comment
+    data[directory + 32 : directory + 34] = b"\1\0"
+    assert "has a name" in detail_of(bytes(data))
+
+
 def test_a_link_is_refused():
     def link(entry: zipfile.ZipInfo) -> None:
         entry.external_attr = 0o120777 << 16
