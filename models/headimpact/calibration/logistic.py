@@ -21,8 +21,8 @@ BoolArray = NDArray[np.bool_]
 Counts = NDArray[np.float64] | NDArray[np.uint16]
 """How often each of n impacts is in each of B resamples, n x B."""
 
-LAST_STEP = 1e-7
-"""Newton stops after a step that moves no scaled coefficient by more: the next is of the order of its square."""
+LAST_STEP, LAST_STEP_OF_RESAMPLE = 1e-10, 1e-8
+"""Newton stops after a step that moves no scaled coefficient by more: the next would be of the order of its square."""
 MAX_CONDITION = 1e14
 """Beyond this the information says nothing of some direction: one in which a separated resample is on its way."""
 MAX_ITERATIONS = 60
@@ -154,7 +154,7 @@ def fit(sample: Sample, weights: FloatArray | None = None) -> LogisticFit:
     require_fittable(sample)
     w = np.ones((sample.n, 1)) if weights is None else weights[:, None]
     scaled_design = sample.design / sample.scale
-    scaled = _newton(scaled_design, sample.y, w)
+    scaled = _newton(scaled_design, sample.y, w, LAST_STEP)
     beta = scaled.coefficients[:, 0]
     p = risk_of(scaled_design @ beta[:, None])
     information = _Problem(scaled_design, sample.y).information(w * p * (1.0 - p))[0]
@@ -196,8 +196,9 @@ def fit_resamples(sample: Sample, counts: Counts, start: FloatArray | None = Non
         Coefficients to begin from, k: those of the sample itself are near those of its resamples.
     """
     first_guess = None if start is None else start * sample.scale
+    design = sample.design / sample.scale
     blocks = [
-        _newton(sample.design / sample.scale, sample.y, _floats(counts[:, first : first + BLOCK]), first_guess)
+        _newton(design, sample.y, _floats(counts[:, first : first + BLOCK]), LAST_STEP_OF_RESAMPLE, first_guess)
         for first in range(0, counts.shape[1], BLOCK)
     ]
     coefficients = np.concatenate([block.coefficients for block in blocks], axis=1) / sample.scale[:, None]
@@ -215,7 +216,9 @@ class _Settled:
     iterations: int
 
 
-def _newton(design: FloatArray, y: FloatArray, weights: FloatArray, start: FloatArray | None = None) -> _Settled:
+def _newton(
+    design: FloatArray, y: FloatArray, weights: FloatArray, last_step: float, start: FloatArray | None = None
+) -> _Settled:
     """Newton's method with step-halving, for every column of weights (n x B) at once."""
     problem = _Problem(design, y)
     beta = _null_coefficients(y, weights, design.shape[1])
@@ -229,7 +232,7 @@ def _newton(design: FloatArray, y: FloatArray, weights: FloatArray, start: Float
     while working.size and iterations < MAX_ITERATIONS:
         iterations += 1
         step, solved, information = problem.step(w, margin)
-        settled = solved & (np.abs(step).max(axis=0) <= LAST_STEP)
+        settled = solved & (np.abs(step).max(axis=0) <= last_step)
         settled[settled] = np.linalg.cond(information[settled]) < MAX_CONDITION
         change = problem.signed @ step
         _halve(problem, w, margin, step, change)
