@@ -120,7 +120,7 @@ def _driven(design: Design, x: FloatArray) -> FloatArray:
     pairs = x[:, 1:] + x[:, :-1]
     driven = np.empty_like(x)
     np.add(pairs[:, 1:], pairs[:, :-1], out=driven[:, 2:])
-    driven *= b0
+    driven[:, 2:] *= b0
     driven[:, 0] = x[:, 0]
     driven[:, 1:2] = b0 * x[:, 1:2] + (3.0 * b0 - a2) * x[:, :1]
     return driven

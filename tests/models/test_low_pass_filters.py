@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy import signal
 from waveforms import recording
 
+from headimpact import filtering
 from headimpact.filtering import CHANNEL_FREQUENCY_CLASSES, NO_FILTER, PAPER, LowPass, corner_frequency, low_pass
 from headimpact.preparation import prepare
 
@@ -31,6 +32,25 @@ def test_the_filter_equals_scipys_zero_phase_filter(rate_hz, cut_off, samples):
     corner = corner_frequency(cut_off, rate_hz)
     expected = zero_phase(x, corner, rate_hz)
     np.testing.assert_allclose(low_pass(x.T, corner, rate_hz).T, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 50])
+def test_nothing_is_read_of_memory_that_was_not_written(monkeypatch: pytest.MonkeyPatch, samples: int):
+    """Whatever is in fresh memory, not even a warning comes of it."""
+    x = np.random.default_rng(3).normal(0, 20, (3, samples))
+    expected = low_pass(x, 300.0, 1000.0)
+    filtering._bands.cache_clear()
+    for name in ("empty", "empty_like"):
+        made = getattr(np, name)
+        monkeypatch.setattr(np, name, lambda *a, made=made, **k: poisoned(made(*a, **k)))
+    found = low_pass(x, 300.0, 1000.0)
+    monkeypatch.undo()
+    np.testing.assert_array_equal(found, expected)
+
+
+def poisoned(fresh: np.ndarray) -> np.ndarray:
+    fresh.fill(np.inf)
+    return fresh
 
 
 def test_a_block_of_impacts_is_filtered_as_each_of_them():

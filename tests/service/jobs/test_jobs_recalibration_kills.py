@@ -154,7 +154,9 @@ def test_twenty_kills_of_service_and_worker_in_fits(house: House) -> None:
     assert [job["state"] for job in found] == ["succeeded"] * 20
     assert [job["result"]["version"] for job in found] == [f"fit-{number}" for number in range(20)]
     with house.service.client(house.key) as client:
-        documents = [client.get(f"/v1/models/fit-{number}").json()["criteria"] for number in range(20)]
+        answers = [client.get(f"/v1/models/fit-{number}") for number in range(20)]
+    assert [answer.status_code for answer in answers] == [200] * 20, answers[0].text
+    documents = [answer.json()["curves"] for answer in answers]
     assert all(document == documents[0] for document in documents)
     assert worker.stop() == 0
 
