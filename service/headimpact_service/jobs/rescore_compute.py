@@ -81,9 +81,5 @@ def _scored(
     return Rescored(number, last, scores, len(stored) - len(scores))
 
 
-def _record(document: Any, trace: bytes) -> ImpactRecord:  # noqa: ANN401 - a document of the store
-    return rebuild_record(document, traces.decode(trace))
-
-
 def _values(member: tuple[bytes, ImpactRecord]) -> int:
     return member[1].values
