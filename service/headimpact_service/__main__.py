@@ -137,7 +137,10 @@ def revoke_key(key_id: str, organisation: Organisation = "default", database_url
 
 @app.command()
 def score(
-    file: Annotated[Path, typer.Argument(help="CSV, JSON, NDJSON or NHTSA zip; - for standard input.")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="A file, a laboratory's folder, or - for standard input."),
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="Print the JSON of POST /v1/score.")] = False,
     preset: Annotated[str | None, typer.Option(help="A device's layout, as GET /v1/presets lists them.")] = None,
     mapping: Annotated[str | None, typer.Option(help="JSON, or @ and a file of it: which column is what.")] = None,

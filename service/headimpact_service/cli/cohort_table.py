@@ -21,6 +21,7 @@ from headimpact.eligibility import exclusion_reason, outcome_of
 from headimpact.errors import CalibrationError
 from headimpact_service.cli.strain_table import COLUMNS as STRAINS
 from headimpact_service.cli.strain_table import strain_document
+from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.store.tables import CRITERION_COLUMNS
 
 REQUIRED = ("athlete_id", "outcome")
@@ -31,8 +32,6 @@ NOTHING = frozenset({"", "NA"})
 """Cells without a value; R writes the second."""
 TRUTHS = {"true": "1", "false": "0"}
 """Outcomes of data frames whose column is logical, whatever their case."""
-FORMULA_GUARD = "'"
-"""What our export puts before a cell that a spreadsheet would take for a formula."""
 
 
 class TableError(ValueError):
@@ -209,8 +208,7 @@ def _text(cell: Any) -> str:  # noqa: ANN401 - a cell of any type
         return ""
     if isinstance(cell, bool):
         return str(int(cell))
-    text = str(cell).strip()
-    return text[1:] if text.startswith(FORMULA_GUARD) else text
+    return unguarded(str(cell).strip())
 
 
 def _outcome(cell: Any, row: int) -> float | None:  # noqa: ANN401 - a cell of any type

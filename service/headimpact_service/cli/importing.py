@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -14,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from headimpact_service.cli.database import migrated
 from headimpact_service.cli.faults import USAGE, problem_line
+from headimpact_service.cli.files import files_of
 from headimpact_service.cli.score import with_mapping
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
@@ -29,8 +28,6 @@ CHUNK = 500
 """Impacts that are committed together."""
 SHOWN = 5
 """Refused impacts of a file that are told one by one."""
-SET_MARKS = ("*.ev5", "*.mme")
-"""What makes a folder one set of channels: a laboratory's file that describes the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +50,7 @@ def run(
     """Import every file; the exit code is 2 if any impact of any file was refused."""
     given = with_mapping(fields)
     ImportOptions.from_fields(given)  # a field that is wrong is wrong for every file: say so before the first
-    files = [file for path in paths for file in _files(path)]
+    files = [file for path in paths for file in files_of(path)]
     if not files:
         raise ValueError("There is no file to import in these paths.")
     console = Console(highlight=False, soft_wrap=True)
@@ -74,33 +71,6 @@ def run(
 def _progress(console: Console) -> Progress:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-
-
-def _files(path: Path) -> Iterator[tuple[Path, bytes | Path]]:
-    """A file; a folder of one laboratory set as the zip it would be sent as; any other folder file by file."""
-    if not path.is_dir():
-        if not path.exists():
-            raise ValueError(f"There is no file {path}.")
-        yield path, path
-    elif _is_set(path):
-        yield path, _zipped(path)
-    else:
-        for inside in sorted(path.iterdir()):
-            if not inside.name.startswith("."):
-                yield from _files(inside)
-
-
-def _is_set(folder: Path) -> bool:
-    return any(file.match(mark) or file.match(mark.upper()) for file in folder.iterdir() for mark in SET_MARKS)
-
-
-def _zipped(folder: Path) -> bytes:
-    held = io.BytesIO()
-    with zipfile.ZipFile(held, "w") as archive:
-        for file in sorted(folder.rglob("*")):
-            if file.is_file() and not file.is_symlink():
-                archive.write(file, file.relative_to(folder))
-    return held.getvalue()
 
 
 def _target(database: Database, organisation: str, mode: str) -> Target:
@@ -136,7 +106,10 @@ def _import(
             rows += _chunk(database, target, part, len(rows), dry_run=dry_run)
             advance(total, len(rows))
     except Problem as problem:
-        console.print(f"{label}: refused: {problem_line(problem)}")
+        console.print(f"{label}: refused: {problem_line(problem)}", markup=False)
+        return 1
+    except OSError as error:
+        console.print(f"{label}: refused: {error.strerror or 'it cannot be read'}.", markup=False)
         return 1
     return _report(console, label, rows)
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from headimpact_service.answers import json_bytes
 from headimpact_service.cli.faults import USAGE, problem_line
+from headimpact_service.cli.files import is_set, zipped
 from headimpact_service.cli.score_table import show
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
@@ -35,7 +36,13 @@ def run(file: Path, fields: Mapping[str, str], *, as_json: bool) -> int:
 
 
 def _bytes(file: Path) -> bytes:
-    return sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
+    if str(file) == "-":
+        return sys.stdin.buffer.read()
+    if not file.is_dir():
+        return file.read_bytes()
+    if not is_set(file):
+        raise ValueError(f"{file} is a folder, but not one set of a laboratory: score one of its files.")
+    return zipped(file)
 
 
 def with_mapping(fields: Mapping[str, str]) -> dict[str, str]:

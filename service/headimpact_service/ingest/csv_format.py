@@ -1,19 +1,18 @@
 """CSV: separated text with a line of headings.
 
-Comma, semicolon or tab, one of them for the whole file; UTF-8 with or without its mark, else Latin-1; decimal points.
-What is not a number stays a fault of its own impact; what makes the rows uncertain (a row longer or shorter than the
-headings, a decimal comma, a line without end) is a fault of the file.
+Comma, semicolon or tab, one of them for the whole file; UTF-8 with or without its mark, UTF-16 with it, else Latin-1;
+decimal points, or decimal commas where they cannot be anything else. What is not a number stays a fault of its own
+impact; what makes the rows uncertain (a row longer or shorter than the headings, a comma that may group thousands, a
+line without end) is a fault of the file.
 """
 
 from __future__ import annotations
 
-import codecs
 import csv
 import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import chain, islice
 from types import MappingProxyType
 from typing import TYPE_CHECKING, BinaryIO
@@ -28,14 +27,15 @@ from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
+from headimpact_service.ingest.text_facts import text_facts, unreadable
 
 if TYPE_CHECKING:
     from _csv import Reader
 
-MAX_LINE = 256 * 1024
 MAX_COLUMNS = 1024
 ROWS_AT_ONCE = 4096
 _DELIMITERS = (",", ";", "\t")
+_SEPARATOR = re.compile(r"sep=.\s*", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*")
 Block = tuple[FloatArray, Sequence[Sequence[str]]]
 # float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
@@ -63,18 +63,20 @@ class CsvTable:
 
     def __init__(self, stream: BinaryIO, *, skip_rows: int = 0) -> None:
         """Look through the file, then read as far as the headings; 422 where there are none."""
-        text = _text_facts(stream)
+        text = text_facts(stream)
         stream.seek(0)
         self._lines = _lines(stream, text.encoding)
         self._quoted = text.quoted
         self._line = 0
         heading = self._first_line(skip_rows)
         self._delimiter = _delimiter(heading)
+        self._decimal_mark = ""
+        self._decimal_commas = text.has_decimal_commas(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
         self.headings: tuple[str, ...] = tuple(self._rows(reader, 1)[0])
         self._simply_quoted = _simply_quoted(self._delimiter)
         if len(self.headings) > MAX_COLUMNS:
-            raise _unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
+            raise unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The columns, block by block, so that only numbers are kept of the numbers."""
@@ -87,12 +89,12 @@ class CsvTable:
             )
 
     def _first_line(self, skip_rows: int) -> str:
-        """The line of headings: the first that is neither skipped, empty nor a comment."""
+        """The line of headings: the first that is neither skipped, empty, a comment nor a spreadsheet's `sep=;`."""
         for number, line in enumerate(self._lines):
-            if number >= skip_rows and line.strip() and not line.startswith("#"):
+            if number >= skip_rows and line.strip() and not line.startswith("#") and not _SEPARATOR.fullmatch(line):
                 self._line = number
                 return line
-        raise _unreadable("The file has no line of headings.")
+        raise unreadable("The file has no line of headings.")
 
     def _blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
         """Some thousand rows at a time: the number columns as one array, the text columns as lists."""
@@ -110,6 +112,8 @@ class CsvTable:
 
     def _fast(self, lines: list[str], numbers: Sequence[int], texts: Sequence[int]) -> Block | None:
         """A block in which a line is a row, by NumPy's own reader; None where a line is not as plain as that."""
+        if self._decimal_commas:
+            return None
         if self._quoted:
             lines = [self._simply_quoted.sub(r"\1", line) if '"' in line else line for line in lines]
             if any('"' in line for line in lines):
@@ -135,7 +139,7 @@ class CsvTable:
         try:
             return list(islice(reader, count))
         except csv.Error:
-            raise _unreadable(f"The quotes around line {self._line + reader.line_num} do not match.") from None
+            raise unreadable(f"The quotes around line {self._line + reader.line_num} do not match.") from None
 
     def _fitted(self, row: list[str]) -> list[str]:
         """A row as long as the headings: spreadsheets add empty cells at the end, and rows of nothing else."""
@@ -143,17 +147,32 @@ class CsvTable:
         if not any(cell.strip() for cell in row):
             return []
         if len(row) < width or any(cell.strip() for cell in row[width:]):
-            raise _unreadable(
+            raise unreadable(
                 f"A row from line {self._line + 1} on has {len(row)} cells where the headings have {width}."
             )
         return row[:width]
 
     def _number(self, cell: str) -> float:
         """The number in a cell; NaN where there is none."""
-        if _NUMBER.fullmatch(cell) is not None:
-            return float(cell)
-        if self._delimiter != "," and _DECIMAL_COMMA.fullmatch(cell) is not None:
-            raise _unreadable("Numbers are written with a decimal point; this file has decimal commas.")
+        comma = _NUMBER.fullmatch(cell) is None
+        if comma and _DECIMAL_COMMA.fullmatch(cell) is None:
+            return float("nan")
+        if comma and not self._decimal_commas:
+            return self._unclear(
+                "Whether commas in the file's numbers are decimal or group thousands is not clear: write them with a "
+                "decimal point."
+            )
+        if self._decimal_commas and (comma or "." in cell):
+            mark = "," if comma else "."
+            self._decimal_mark = self._decimal_mark or mark
+            if mark != self._decimal_mark:
+                return self._unclear("The file's numbers have decimal commas, and points too: use one of them.")
+        return float(cell.replace(",", "."))
+
+    def _unclear(self, detail: str) -> float:
+        """Refuse the file; between commas, where it takes quotes to write one, only the cell is none of a number."""
+        if self._delimiter != ",":
+            raise unreadable(detail)
         return float("nan")
 
 
@@ -167,65 +186,17 @@ def _lines(stream: BinaryIO, encoding: str) -> Iterator[str]:
             text.detach()
 
 
-@dataclass(frozen=True, slots=True)
-class _TextFacts:
-    """What has to be known of a text before its first line is read."""
-
-    encoding: str
-    quoted: bool
-
-
-def _text_facts(stream: BinaryIO) -> _TextFacts:
-    """Look through the whole text; refuse what would make a text reader hold a great deal at once."""
-    utf8, quoted, line, first = codecs.getincrementaldecoder("utf-8")(), False, 0, b""
-    is_utf8 = True
-    while piece := stream.read(MAX_LINE):
-        if b"\0" in piece:
-            raise _unreadable("A text file holds no NUL bytes.")
-        first = first or piece[:3]
-        line = _line_after(piece, line)
-        quoted = quoted or b'"' in piece
-        is_utf8 = is_utf8 and _decodes(utf8, piece, final=False)
-    is_utf8 = is_utf8 and _decodes(utf8, b"", final=True)
-    marked = first == codecs.BOM_UTF8
-    if marked and not is_utf8:
-        raise _unreadable("The text is marked as UTF-8, which it is not.")
-    return _TextFacts("utf-8-sig" if marked else "utf-8" if is_utf8 else "latin-1", quoted)
-
-
-def _line_after(piece: bytes, before: int) -> int:
-    """The length of the line that the piece leaves unended; 422 where a line is too long."""
-    ends = [place for place in (piece.find(b"\n"), piece.find(b"\r")) if place >= 0]
-    if before + min(ends, default=len(piece)) > MAX_LINE:
-        raise _unreadable(f"A line may have at most {MAX_LINE} bytes.")
-    if not ends:
-        return before + len(piece)
-    return len(piece) - 1 - max(piece.rfind(b"\n"), piece.rfind(b"\r"))
-
-
-def _decodes(decoder: codecs.IncrementalDecoder, piece: bytes, *, final: bool) -> bool:
-    try:
-        decoder.decode(piece, final)
-    except UnicodeDecodeError:
-        return False
-    return True
-
-
 def _delimiter(heading: str) -> str:
     """The one separator of the headings outside quotes; where two occur, the one that occurs more often."""
     bare = re.sub(r'"[^"]*"', "", heading)
     counts = sorted(((bare.count(delimiter), delimiter) for delimiter in _DELIMITERS), reverse=True)
     if counts[0][0] == 0:
-        raise _unreadable("The headings are not separated by commas, semicolons or tabs.")
+        raise unreadable("The headings are not separated by commas, semicolons or tabs.")
     if counts[0][0] == counts[1][0]:
-        raise _unreadable("The headings hold two separators equally often: use one for the whole file.")
+        raise unreadable("The headings hold two separators equally often: use one for the whole file.")
     return counts[0][1]
 
 
 def _simply_quoted(delimiter: str) -> re.Pattern[str]:
     """A cell in quotes that hold neither separators nor quotes: it is what stands between them."""
     return re.compile(rf'(?:^|(?<={delimiter}))"([^"{delimiter}\r\n]*)"(?=[{delimiter}\r\n]|$)')
-
-
-def _unreadable(detail: str) -> Problem:
-    return Problem("unreadable-file", detail)

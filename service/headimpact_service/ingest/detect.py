@@ -6,6 +6,7 @@ import codecs
 from enum import Enum
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.text_facts import UTF_16
 
 READ = (
     "CSV (also of DTS), JSON, NDJSON, Parquet, Arrow IPC, MATLAB (-v7), xlsx, npz, "
@@ -60,6 +61,8 @@ def detect(data: bytes, *, filename: str | None = None, content_type: str | None
         raise Problem("unreadable-file", "The file is empty.")
     if data.startswith(_ZIP):
         return Kind.ZIP
+    if data.startswith(UTF_16):
+        return Kind.CSV
     known = next((kind for magic, kind in _READ_BINARY.items() if data.startswith(magic)), None)
     if known is not None:
         return known

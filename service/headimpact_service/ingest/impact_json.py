@@ -246,7 +246,12 @@ class Kinematics(Strict):
     mounting: MountingBody | None = None
     constrained_plane: Plane | None = Field(None, description="The motion outside this plane is zero.")
     pre_trigger_ms: float | None = Field(
-        None, ge=0.0, le=60_000.0, description="From the first sample to the trigger [ms].", examples=[10]
+        None,
+        ge=0.0,
+        le=60_000.0,
+        description="From the first sample to the trigger [ms]; null: not known. Where it is absent and `time_ms` "
+        "goes from below zero to above, zero is the trigger.",
+        examples=[10],
     )
     filter: Filter = Field("paper", description="`paper` is 300 Hz on acceleration and 184 Hz on angular velocity.")
     fill_gaps: bool = Field(

@@ -26,7 +26,7 @@ from headimpact_service.ingest.impact_json import (
 )
 from headimpact_service.ingest.json_faults import parse, rules_problem
 from headimpact_service.ingest.record import ImpactRecord
-from headimpact_service.ingest.stamps import nominal_rate
+from headimpact_service.ingest.stamps import before_zero_ms, nominal_rate
 
 Body = TypeVar("Body", bound=ScoreBody)
 
@@ -82,9 +82,22 @@ def recording(kinematics: Kinematics) -> Recording:
         mounting=None if kinematics.mounting is None else mounting(kinematics.mounting),
         constrained_plane=kinematics.constrained_plane,
         low_pass=low_pass(kinematics.filter),
-        pre_trigger_ms=kinematics.pre_trigger_ms,
+        pre_trigger_ms=_pre_trigger_ms(kinematics),
         fill_gaps=kinematics.fill_gaps,
     )
+
+
+def _pre_trigger_ms(kinematics: Kinematics) -> float | None:
+    """The time before the trigger: as it is said, null for not known; where nothing is said, by the stamps."""
+    if "pre_trigger_ms" in kinematics.model_fields_set:
+        return kinematics.pre_trigger_ms
+    stamps = [body.time_ms for body in _signals(kinematics) if body.time_ms is not None]
+    return before_zero_ms((of_one[0], of_one[-1]) for of_one in stamps) if stamps else None
+
+
+def _signals(kinematics: Kinematics) -> list[SignalBody]:
+    bodies = (kinematics.linear_acceleration, kinematics.angular_velocity, kinematics.angular_acceleration)
+    return [body for body in bodies if body is not None]
 
 
 def _require_whole(sent: Recording, what: str) -> None:
@@ -139,8 +152,7 @@ def _require_rotation(rotation: list[list[float]], sensor: str, place: str) -> N
 
 def _share_their_start(kinematics: Kinematics) -> bool:
     """Whether every signal starts at one instant: only then may stamps be replaced by the rate that they say."""
-    bodies = (kinematics.linear_acceleration, kinematics.angular_velocity, kinematics.angular_acceleration)
-    starts = {None if body.time_ms is None else body.time_ms[0] for body in bodies if body is not None}
+    starts = {None if body.time_ms is None else body.time_ms[0] for body in _signals(kinematics)}
     return len(starts) == 1
 
 

@@ -12,12 +12,12 @@ from pydantic import BaseModel
 from pydantic_core import to_json
 
 from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.ingest.json_faults import parse
 
 MAX_ROWS = 50_000
 IMPACT = ("impact_id", "external_id")
 """A line names its impact by one of these."""
-_GUARD = "'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,18 +81,13 @@ def _line(index: int, header: Sequence[str], cells: Sequence[str], model: type[B
             "invalid-payload", f"The line has {len(cells)} cells where the table has {len(header)} columns."
         )
         return LabelLine(index, None, None, fault)
-    values = {name: _unguarded(cell.strip()) for name, cell in zip(header, cells, strict=True)}
+    values = {name: unguarded(cell.strip()) for name, cell in zip(header, cells, strict=True)}
     given = {name: cell for name, cell in values.items() if cell}
     impact_id, external_id = given.pop("impact_id", None), given.pop("external_id", None)
     if impact_id is None and external_id is None:
         fault = Problem("invalid-payload", "The line names no impact.")
         return LabelLine(index, None, None, fault)
     return LabelLine(index, impact_id, external_id, _said(given, model))
-
-
-def _unguarded(cell: str) -> str:
-    """Our own tables keep spreadsheets from taking a name for a formula."""
-    return cell[1:] if cell.startswith(_GUARD) else cell
 
 
 def _said(given: Mapping[str, str], model: type[BaseModel]) -> BaseModel | Problem:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,3 +40,9 @@ def _rounded(rate: float) -> float:
         return rate
     whole = float(round(rate))
     return whole if abs(rate - whole) <= ROUND_RATE * rate else rate
+
+
+def before_zero_ms(spans: Iterable[tuple[float, float]]) -> float | None:
+    """How long before zero the record begins [ms], where its signals' stamps span zero: that is the trigger then."""
+    starts, ends = zip(*spans, strict=True)
+    return round(-min(starts), 9) if min(starts) < 0.0 <= max(ends) else None

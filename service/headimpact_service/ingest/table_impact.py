@@ -16,7 +16,8 @@ from headimpact.quality import QualityNote, check_reported_resultant
 from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
-from headimpact_service.ingest.impact_json import MAX_SAMPLES
+from headimpact_service.ingest.formula_cells import unguarded
+from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass, mounting
 from headimpact_service.ingest.labels import (
     NOTHING_SAID,
@@ -31,6 +32,7 @@ from headimpact_service.ingest.layout import Layout, SignalLayout
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.stamps import before_zero_ms
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, Window
@@ -254,28 +256,28 @@ class TableImpact:
 
     def _pre_trigger_ms(self, tracks: list[Track], kept: list[Track]) -> float | None:
         """The time before the trigger: as said for this impact or by the sender, by the stamps, or by the layout."""
-        if self.reading.pre_trigger_ms is not None:
-            return self.reading.pre_trigger_ms
+        if "pre_trigger_ms" in self.layout.reading:  # an empty cell says that it is not known
+            said = self.reading.pre_trigger_ms
+            return self.mapping.pre_trigger_ms if said is None else said
         stated = self.mapping.pre_trigger_ms
         if stated is not None:
             stated = max(0.0, round(stated - self._dropped_ms(tracks, kept), 9))
-        starts = [start for track in kept if (start := track.start_ms) is not None]
-        if not starts or "pre_trigger_ms" in self.plan.required:
+        spans = [span for track in kept if (span := track.span_ms) is not None]
+        if not spans or "pre_trigger_ms" in self.plan.required or self.mapping.zero == "record_start":
             return stated
-        spans_zero = min(starts) < 0.0 <= max(end for track in kept if (end := track.end_ms) is not None)
-        zero = self.mapping.zero or ("trigger" if spans_zero else "record_start")
-        if zero == "record_start":
-            return stated
-        if not spans_zero and min(starts) != 0.0:
-            detail = "The record's times must include zero, which its layout says is the trigger."
-            raise label_fault(detail, "time-zero")
-        return round(-min(starts), 9) + 0.0
+        before = before_zero_ms(spans)
+        if before is None and self.mapping.zero == "trigger":
+            if min(spans)[0] != 0.0:
+                detail = "The record's times must include zero, which its layout says is the trigger."
+                raise label_fault(detail, "time-zero")
+            return 0.0
+        return stated if before is None else before
 
     def _dropped_ms(self, tracks: list[Track], kept: list[Track]) -> float:
         """How much later than the file's record the one that is kept begins."""
         if not self.mapping.drop_rows:
             return 0.0
-        before, after = ([s for t in of if (s := t.start_ms) is not None] for of in (tracks, kept))
+        before, after = ([span[0] for t in of if (span := t.span_ms) is not None] for of in (tracks, kept))
         if before and after:
             return min(after) - min(before)
         return min((1000.0 * self.mapping.drop_rows / track.rate for track in kept if track.rate), default=0.0)
@@ -294,7 +296,8 @@ class TableImpact:
     def _text(self, column: int | None) -> str | None:
         if column is None:
             return None
-        return self.samples.texts[column][self.cell].strip() or None
+        text = self.samples.texts[column][self.cell].strip()
+        return (unguarded(text) if self.plan.format == "csv" else text) or None
 
     def _name(self, field: str, column: int | None) -> str | None:
         return checked_name(self._text(column), field)
@@ -312,4 +315,10 @@ class TableImpact:
 
     def _metadata(self) -> dict[str, Any]:
         told = {"format": self.plan.format, "preset": self.plan.preset, "file": self.options.filename}
-        return {name: value for name, value in told.items() if value is not None}
+        keys = [self._text(column) for column in self.layout.keys if column != self.layout.external_id]
+        return {name: value for name, value in told.items() if value is not None} | self._told_apart(keys)
+
+    def _told_apart(self, keys: list[str | None]) -> dict[str, Any]:
+        """What the file itself calls the impact, where that is no name outside it."""
+        known = [key for key in keys if key is not None]
+        return {"impact": " ".join(known)[:MAX_NAME]} if known else {}

@@ -24,19 +24,11 @@ class Track:
     milliseconds: float
 
     @property
-    def first_stamp(self) -> float | None:
-        """The first stamp, as written."""
-        return None if self.stamps is None or not self.stamps.size else float(self.stamps[0])
-
-    @property
-    def start_ms(self) -> float | None:
-        """The first stamp [ms]."""
-        return None if self.first_stamp is None else self.first_stamp * self.milliseconds
-
-    @property
-    def end_ms(self) -> float | None:
-        """The last stamp [ms]."""
-        return None if self.stamps is None or not self.stamps.size else float(self.stamps[-1]) * self.milliseconds
+    def span_ms(self) -> tuple[float, float] | None:
+        """The first and the last stamp [ms]."""
+        if self.stamps is None or not self.stamps.size:
+            return None
+        return float(self.stamps[0]) * self.milliseconds, float(self.stamps[-1]) * self.milliseconds
 
 
 TimeBase = tuple[float | None, FloatArray | None]

@@ -10,13 +10,13 @@ from typing import Any, Literal, Protocol
 
 from headimpact_service.answers import CSV, NDJSON, PARQUET, json_bytes
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.formula_cells import guarded
 
 Cell = str | float | int | bool | datetime | None
 Kind = Literal["text", "number", "integer", "flag", "instant"]
 """What the cells of a column are; Parquet's columns have types."""
 
 # A spreadsheet takes a cell that begins with one of these for a formula.
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 ROW_GROUP = 100_000
 """Rows of a Parquet file that are held until they are written together."""
 
@@ -57,7 +57,7 @@ class CsvForm:
 
 def _csv_cell(cell: Cell) -> str | float | int | None:
     if isinstance(cell, str):
-        return "'" + cell if cell.startswith(_FORMULA) else cell
+        return guarded(cell)
     if isinstance(cell, bool):
         return "true" if cell else "false"
     return timestamp(cell) if isinstance(cell, datetime) else cell

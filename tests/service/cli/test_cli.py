@@ -206,9 +206,13 @@ class TestImport:
         assert run("import", str(file), "--dry-run", "--database-url", database)[1].strip() == f"{file}: 1 readable"
         assert "1 created" in run("import", str(file), "--database-url", database)[1]
 
-    def test_a_path_that_is_not_there_is_one_line(self, run: Run, tmp_path: Path) -> None:
-        code, _, failed = run("import", str(tmp_path / "none"), "--database-url", f"sqlite:///{tmp_path / 'x.db'}")
-        assert (code, failed) == (2, f"headimpact: There is no file {tmp_path / 'none'}.\n")
+    def test_a_path_that_is_not_there_has_its_line_and_stops_nothing(self, run: Run, tmp_path: Path) -> None:
+        file, missing = tmp_path / "a.json", tmp_path / "none.csv"
+        file.write_text(json.dumps(impact_body("a")))
+        database = f"sqlite:///{tmp_path / 'x.db'}"
+        code, printed, failed = run("import", str(missing), str(file), "--database-url", database)
+        assert (code, failed) == (2, "")
+        assert printed.splitlines() == [f"{missing}: refused: No such file or directory.", f"{file}: 1 created"]
 
     def test_a_folder_of_a_crash_test_is_one_set(self, run: Run, tmp_path: Path) -> None:
         folder = tmp_path / "v1"
@@ -218,3 +222,17 @@ class TestImport:
         _, printed, _ = run("import", str(folder), "--database-url", f"sqlite:///{tmp_path / 'x.db'}")
         assert printed.startswith(f"{folder}: refused")
         assert printed.count("refused") == 1
+
+
+class TestScoreOfFolders:
+    def test_a_folder_of_one_set_is_scored_as_its_zip(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "v1.EV5").write_text("----- INSTRUMENTATION -----\n----- END -----\n")
+        code, _, failed = run("score", str(tmp_path))
+        assert code == 2
+        assert "Is a directory" not in failed
+
+    def test_another_folder_is_said_to_be_one(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "a.csv").write_text("t_s,ax_g\n")
+        code, _, failed = run("score", str(tmp_path))
+        assert code == 2
+        assert failed.startswith(f"headimpact: {tmp_path} is a folder, but not one set of a laboratory")

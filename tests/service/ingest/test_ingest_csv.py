@@ -133,10 +133,54 @@ def test_quotes_in_some_rows_change_nothing_in_the_others(cell: str, held: str |
     assert (found[1].external_id if hasattr(found[1], "external_id") else None) == held
 
 
-def test_decimal_commas_are_refused_as_what_they_are():
-    problem = refused(csv_text(delimiter=";").replace(".", ","))
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_decimal_commas_between_other_separators_are_read(delimiter: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(csv_format, "ROWS_AT_ONCE", 7)
+    text = csv_text(delimiter=delimiter, before={"label": "v1.5"})
+    np.testing.assert_array_equal(samples_of(one(text.replace(".", ","))), six_axis())
+
+
+def test_decimal_commas_in_quotes_are_read():
+    lines = csv_text().splitlines()
+    quoted = [",".join(f'"{cell}"' for cell in line.split(",")).replace(".", ",") for line in lines[1:]]
+    np.testing.assert_array_equal(samples_of(one("\n".join([lines[0], *quoted]))), six_axis())
+
+
+def test_a_comma_in_a_label_says_nothing_of_the_numbers():
+    text = csv_text(delimiter=";", before={"label": "1,5"})
+    np.testing.assert_array_equal(samples_of(one(text)), six_axis())
+
+
+def test_commas_that_may_group_thousands_are_refused():
+    lines = csv_text(np.arange(240.0).reshape(40, 6), rate_hz=0.001, delimiter=";").replace(".0", "").splitlines()
+    lines[7] = lines[7].rsplit(";", 1)[0] + ";1,234"
+    problem = refused("\n".join(lines))
     assert problem.slug == "unreadable-file"
-    assert "decimal point" in problem.detail
+    assert "group thousands" in problem.detail
+
+
+def test_decimal_commas_beside_points_are_refused():
+    lines = csv_text(delimiter=";").replace(".", ",").splitlines()
+    lines[9] = lines[9].replace(",", ".", 1)
+    assert "and points too" in refused("\n".join(lines)).detail
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_what_a_spreadsheet_calls_unicode_text_is_read(encoding: str):
+    marks = {"utf-16": "", "utf-16-le": "\ufeff", "utf-16-be": "\ufeff"}
+    text = csv_text(delimiter="\t", before={"athlete": "Zoë"})
+    record = one((marks[encoding] + text).encode(encoding))
+    assert record.athlete_external_id == "Zoë"
+    np.testing.assert_array_equal(samples_of(record), six_axis())
+
+
+@pytest.mark.parametrize("data", [b"\xff\xfea", b"\xff\xfe\x00\xd8a\x00", b"\xfe\xff" + b"\0a" * 400_000])
+def test_broken_utf16_is_refused(data: bytes):
+    assert refused(data).slug == "unreadable-file"
+
+
+def test_a_line_that_names_the_separator_is_skipped():
+    np.testing.assert_array_equal(samples_of(one("sep=;\r\n" + csv_text(delimiter=";"))), six_axis())
 
 
 @pytest.mark.parametrize(

@@ -380,6 +380,31 @@ def test_a_pre_trigger_time_is_a_number_of_milliseconds(value: Any):
     assert pointer == "/kinematics/pre_trigger_ms"
 
 
+def stamped(first: float, **changes: Any) -> dict[str, Any]:
+    """Kinematics without a word on the trigger, with stamps of 1 ms from `first` on."""
+    kinematics = body()["kinematics"] | changes
+    for name in ("linear_acceleration", "angular_velocity"):
+        del kinematics[name]["sample_rate_hz"]
+        kinematics[name]["time_ms"] = [first + i for i in range(40)]
+    return kinematics
+
+
+def said_nothing(kinematics: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in kinematics.items() if name != "pre_trigger_ms"}
+
+
+@pytest.mark.parametrize(("first", "before"), [(-10.0, 10.0), (-39.0, 39.0), (0.0, None), (-40.0, None), (5.0, None)])
+def test_zero_is_the_trigger_where_stamps_span_it(first: float, before: float | None):
+    record = read_score(encoded({"kinematics": said_nothing(stamped(first))}))
+    assert record.recording.pre_trigger_ms == before
+
+
+def test_the_trigger_is_where_the_sender_says_whatever_the_stamps():
+    for said in (None, 0.0, 7.0):
+        record = read_score(encoded({"kinematics": stamped(-10.0) | {"pre_trigger_ms": said}}))
+        assert record.recording.pre_trigger_ms == said
+
+
 @pytest.mark.parametrize("name", ["", "a\u0000b", "a\nb", "x" * 201])
 def test_a_name_is_printable_and_bounded(name: str):
     [(pointer, _)] = faults_of(body(external_id=name))

@@ -305,9 +305,10 @@ def test_an_swa_file_holds_several_impacts_and_needs_its_rate():
     assert codes(refused(swa("1"), time_zone="UTC")) == [("sample_rate_hz", "rate-missing")]
     records = read(swa("1", "2"), sample_rate_hz=1000.0, time_zone="Europe/London")
     assert len(records) == 2
-    for record in records:
+    for record, number in zip(records, "12", strict=True):
         assert isinstance(record, ImpactRecord)
         assert record.metadata["preset"] == "swa"
+        assert record.metadata["impact"].split()[-1] == number
         assert (record.athlete_external_id, record.device_serial) == ("p-9", "sensor-3")
         assert record.context == {"session_id": "s-1"}
         assert record.occurred_at == datetime(2026, 11, 20, 19, 4, 5, 123000, tzinfo=UTC)
@@ -371,6 +372,20 @@ def test_every_preset_is_listed_with_its_columns_units_and_axes():
         "prevent"
     ]["columns"]
     assert listed["swa"]["requires"] == ["sample_rate_hz", "occurred_at"]
+
+
+def test_an_imperial_file_may_name_its_units_behind_its_headings():
+    units = {"LinAcc": " (m/s^2)", "RotVel": " [deg/s]", "RotAcc": "_rad_s2"}
+    headings = [
+        heading + next((unit for name, unit in units.items() if heading.startswith(name)), "")
+        for heading in PRESET_TABLES["imperial"].split(",")
+    ]
+    recording = one(table(",".join(headings)), preset="imperial").recording
+    assert {name: signal.unit for name, signal in recording.signals()} == {
+        "linear_acceleration": "m/s^2",
+        "angular_velocity": "deg/s",
+        "angular_acceleration": "rad/s^2",
+    }
 
 
 @pytest.mark.parametrize("name", [name for name in PRESET_TABLES if name not in {"biocore", "imperial"}] + ["swa"])

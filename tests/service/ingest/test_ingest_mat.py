@@ -58,6 +58,12 @@ def test_an_array_of_impacts_is_read_by_the_preset(compressed: bool, name: str):
     assert found[0].metadata == {"format": "mat", "preset": PRESET}
 
 
+def test_an_array_of_one_impact_may_have_lost_its_first_dimension():
+    values = noise(1, 100)
+    [record] = records(mat({"hit": values[0], "facts": np.zeros((100, 2))}), preset=PRESET)
+    np.testing.assert_array_equal(samples_of(record), values[0])
+
+
 @pytest.mark.parametrize("lying", [False, True])
 @pytest.mark.parametrize("factor", [1.0, 1000.0])
 def test_a_struct_array_has_times_of_its_own_in_seconds_or_milliseconds(factor: float, lying: bool):

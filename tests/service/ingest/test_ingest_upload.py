@@ -50,7 +50,7 @@ def test_every_kind_has_its_reader():
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook"),
         (b"%PDF-1.7", "PDF"),
         (b"\x7fELF\0\0\0", "not known"),
-        ("a,b\n1,2".encode("utf-16"), "not known"),
+        ("a,b\n1,2".encode("utf-16-le"), "not known"),
     ],
 )
 def test_a_kind_that_is_not_read_is_415_and_named(data: bytes, named: str):

@@ -10,7 +10,7 @@ import pytest
 from ingest_files import body, csv_text, encoded, outcome, read, refused, six_axis, zipped
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest import csv_format, windows
+from headimpact_service.ingest import csv_format, text_facts, windows
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
@@ -113,7 +113,7 @@ def test_text_that_is_marked_utf8_and_is_not_is_refused():
 
 @pytest.mark.parametrize("ending", [b"\n", b"\r", b"\r\n"])
 def test_lines_are_measured_across_the_pieces_that_are_read(ending: bytes, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(csv_format, "MAX_LINE", 130)
+    monkeypatch.setattr(text_facts, "MAX_LINE", 130)
     text = csv_text(before={"label": "x"}).encode().replace(b"\n", ending)
     assert max(map(len, text.split(ending))) <= 130
     assert len(read(text)) == 1

@@ -65,6 +65,18 @@ def variants() -> dict[str, dict[str, Any]]:
         "rates and lengths unlike": unlike,
         "starting apart": apart,
         "one stamped, one not": {"angular_velocity": apart["angular_velocity"]},
+        "stamps around zero": {
+            "pre_trigger_ms": None,
+            "linear_acceleration": stamped("g", (50, -20, 10), [i - 30.0 for i in range(100)]),
+        },
+        "jittered stamps around zero": {
+            "pre_trigger_ms": None,
+            "linear_acceleration": stamped("g", (50, -20, 10), [stamp - jitter[30] for stamp in jitter]),
+        },
+        "a trigger by the stamps": {
+            "linear_acceleration": stamped("g", (50, -20, 10), [i - 30.0 for i in range(100)]),
+            "angular_velocity": stamped("rad/s", (5, 20, 8), [i - 31.0 for i in range(100)]),
+        },
         "angular acceleration supplied": {"angular_acceleration": signal("rad/s^2", (900, 3000, 700))},
         "acceleration in deg/s^2 only": {
             "angular_velocity": None,
@@ -78,6 +90,8 @@ def variants() -> dict[str, dict[str, Any]]:
     bodies = {}
     for number, (name, changes) in enumerate(fields.items()):
         body = impact_body(name, scale=1 + number / 50, athlete={"external_id": f"p-{number % 3}"})
+        if name == "a trigger by the stamps":
+            del body["kinematics"]["pre_trigger_ms"]
         body["kinematics"] |= changes
         bodies[name] = body
     bodies["plain"]["context"] = {
@@ -90,6 +104,9 @@ def variants() -> dict[str, dict[str, Any]]:
         "trigger_threshold_g": 8.5,
         "level": "collegiate",
     }
+    bodies["linear only"] |= {"external_id": "=1+1", "athlete": {"external_id": "-7"}}
+    bodies["rotation only"] |= {"external_id": "'=1+1", "athlete": {"external_id": "'quoted"}}
+    bodies["linear only"]["context"] = {"session_id": "+s", "sport": "'@"}
     bodies["plain"]["device"] = {"serial": "mg-1"}
     disowned = impact_body("disowned", scale=2.0, unscorable=["The laboratory disowns it.", "Twice."])
     disowned["kinematics"]["linear_acceleration"]["y"][7] = None

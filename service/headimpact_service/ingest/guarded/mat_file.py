@@ -103,12 +103,11 @@ def _inflated(stream: BinaryIO, size: int, most: int) -> int:
 
 
 def _arrays(variables: dict[str, Any]) -> ArrayTable:
-    """Every array of three dimensions; of one alone the columns are also called array_1, array_2 and so on."""
-    solid = {
-        name: value
-        for name, value in variables.items()
-        if isinstance(value, np.ndarray) and value.ndim == 3 and value.dtype.kind in "fiu"
-    }
+    """Every array impacts x samples x components, or else samples x components.
+
+    Of one alone the columns are also called array_1, array_2 and so on.
+    """
+    solid = _numeric(variables, 3) or {name: value[np.newaxis] for name, value in _of_one_impact(variables).items()}
     if not solid:
         raise unreadable("The MATLAB file holds neither a struct array nor an array impacts x samples x components.")
     if any(value.shape[2] > MAX_WIDTH for value in solid.values()):
@@ -119,6 +118,23 @@ def _arrays(variables: dict[str, Any]) -> ArrayTable:
         samples.append(_samples(ALONE, next(iter(solid.values()))))
     facts = [Fact(name, None, texts) for name, value in variables.items() if (texts := _texts_of(value, impacts))]
     return ArrayTable(samples, facts, {})
+
+
+def _numeric(variables: dict[str, Any], dimensions: int) -> dict[str, AnyArray]:
+    return {
+        name: value
+        for name, value in variables.items()
+        if isinstance(value, np.ndarray) and value.ndim == dimensions and value.dtype.kind in "fiu"
+    }
+
+
+def _of_one_impact(variables: dict[str, Any]) -> dict[str, AnyArray]:
+    """Arrays samples x components: what is left of an array of one impact when its first dimension is dropped."""
+    return {
+        name: value
+        for name, value in _numeric(variables, 2).items()
+        if len(AXES) <= value.shape[1] <= MAX_WIDTH and value.shape[0] > value.shape[1]
+    }
 
 
 def _samples(name: str, value: AnyArray) -> Samples:

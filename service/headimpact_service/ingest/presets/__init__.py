@@ -39,9 +39,9 @@ class Preset(Strict):
     vocabulary: dict[str, Any] | None = None
 
     def mapping_for(self, headings: Headings) -> Mapping:
-        """The preset's mapping, completed by what the headings say where its vocabulary reads them."""
+        """The preset's mapping, completed by what the headings say: all that its vocabulary reads, or units only."""
         if self.vocabulary is None:
-            return self.mapping
+            return _with_units(self.mapping, headings) if "units" in self.requires else self.mapping
         spoken = _vocabulary(self.name).mapping(headings)
         return spoken.model_copy(update={name: getattr(self.mapping, name) for name in self.mapping.model_fields_set})
 
@@ -50,6 +50,28 @@ class Preset(Strict):
         mapping = self.mapping_for(headings)
         signals = [columns for name in SIGNALS if (columns := mapping.columns_of(name)) is not None]
         return bool(signals) and all(_is_there(columns, headings) for columns in signals)
+
+
+def _with_units(mapping: Mapping, headings: Headings) -> Mapping:
+    """The mapping with the units that headings name behind what the layout calls its columns."""
+    without = {name: found for name in SIGNALS if (found := mapping.columns_of(name)) and found.unit is None}
+    return mapping.model_copy(update={name: _in_unit(name, columns, headings) for name, columns in without.items()})
+
+
+def _in_unit(name: SignalName, columns: SignalColumns, headings: Headings) -> SignalColumns:
+    for unit, spellings in _spoken_units()[name].items():
+        for spelling in spellings:
+            named = {axis: [f"{column} {spelling}" for column in getattr(columns, axis) or ()] for axis in AXES}
+            if all(headings.find(candidates) is not None for candidates in named.values()):
+                return columns.model_copy(update={**named, "unit": unit})
+    return columns
+
+
+@cache
+def _spoken_units() -> dict[SignalName, dict[str, list[str]]]:
+    """How headings spell each signal's units."""
+    words = next(preset.vocabulary for preset in presets().values() if preset.vocabulary is not None)
+    return {name: words[name]["units"] for name in SIGNALS}
 
 
 @cache
