@@ -9,6 +9,8 @@ from pathlib import Path
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 """The numbers of glibc's `mallopt`."""
+_LARGE = 1024 * 1024
+"""Bytes of a block that goes back at once; a block of impacts is computed in smaller ones, which are used again."""
 _DONT_NEED = 4
 """The advice `MADV_DONTNEED` of Linux."""
 _COLLECT_AFTER = 10_000
@@ -25,8 +27,8 @@ def give_back() -> None:
     with suppress(OSError, AttributeError):
         mallopt = ctypes.CDLL(None).mallopt
         mallopt(_ARENA_MAX, 2)
-        mallopt(_MMAP_THRESHOLD, 256 * 1024)
-        mallopt(_TRIM_THRESHOLD, 1024 * 1024)
+        mallopt(_MMAP_THRESHOLD, _LARGE)
+        mallopt(_TRIM_THRESHOLD, 4 * _LARGE)
 
 
 def spare_the_collector() -> None:

@@ -20,8 +20,9 @@ from headimpact_service.intake.records import describe, kinematics_document
 from headimpact_service.intake.rendering import new_score, score_document
 from headimpact_service.intake.scoring import DeviceFacts, Scored, Terms, score_records
 from headimpact_service.intake.storing import new_impact
-from headimpact_service.store import ids, impacts
-from headimpact_service.store.impacts import NewImpact
+from headimpact_service.store import ids
+from headimpact_service.store.impact_batches import Added, add_many
+from headimpact_service.store.impact_rows import NewImpact
 
 Found = Sequence[ImpactRecord | Problem]
 """Impacts as they were read, in the file's order; a fault of one stands in its place."""
@@ -79,22 +80,19 @@ def make_ready(items: Iterable[Item], key_id: bytes | None) -> list[Ready]:
 
 
 def store(conn: Any, data_set_id: bytes, ready: Sequence[Ready], first: int) -> list[dict[str, Any]]:  # noqa: ANN401 - a connection of the store
-    """Add what can be added, in one transaction; what became of each, numbered from `first`.
+    """Add what can be added, in one transaction; what became of each, numbered from `first`."""
+    added = iter(add_many(conn, data_set_id, [item.new for item in ready if isinstance(item.new, NewImpact)]))
+    return [
+        _stored_row(index, item.external_id, item.new if isinstance(item.new, Problem) else next(added))
+        for index, item in enumerate(ready, first)
+    ]
 
-    A refusal comes before anything of that impact is written, so the others stay.
-    """
-    return [_stored(conn, data_set_id, item, index) for index, item in enumerate(ready, first)]
 
-
-def _stored(conn: Any, data_set_id: bytes, item: Ready, index: int) -> dict[str, Any]:  # noqa: ANN401 - a connection of the store
-    if isinstance(item.new, Problem):
-        return failed_row(index, item.external_id, item.new)
-    try:
-        outcome = impacts.add(conn, data_set_id, item.new, same_event_is_unchanged=True)
-    except Problem as problem:
-        return failed_row(index, item.external_id, problem)
-    row = {"index": index, "external_id": item.external_id or outcome.impact.external_id}
-    return row | {"status": outcome.status, "id": ids.encode("imp", outcome.impact.id), "problem": None}
+def _stored_row(index: int, external_id: str | None, outcome: Added | Problem) -> dict[str, Any]:
+    if isinstance(outcome, Problem):
+        return failed_row(index, external_id, outcome)
+    row = {"index": index, "external_id": external_id or outcome.external_id}
+    return row | {"status": outcome.status, "id": ids.encode("imp", outcome.id), "problem": None}
 
 
 def failed_row(index: int, external_id: str | None, problem: Problem) -> dict[str, Any]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from sqlalchemy import BindParameter, Connection, bindparam, func, insert, select, update
+from sqlalchemy import BindParameter, Connection, bindparam, func, select, update
 
 from headimpact_service.errors import PayloadError, Problem, not_found
 from headimpact_service.store import athletes as athlete_store
 from headimpact_service.store import devices as device_store
-from headimpact_service.store import erasure, ids
+from headimpact_service.store import erasure
 from headimpact_service.store.clock import last_change, later_than, next_change
+from headimpact_service.store.impact_inserts import content_members, first_row, insert_revisions, insert_rows
 from headimpact_service.store.impact_lists import (
     ImpactFilters,
     Trace,
@@ -29,9 +30,9 @@ from headimpact_service.store.impact_lists import (
 from headimpact_service.store.impact_rows import Impact, NewImpact, Outcome, Revision, external_id_digest
 from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.revision import require_revision
-from headimpact_service.store.score_rows import row_of, stored
+from headimpact_service.store.score_rows import stored
 from headimpact_service.store.scores import next_number
-from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts, scores
+from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts
 
 __all__ = [
     "Impact",
@@ -103,9 +104,7 @@ _SAME_EVENT = Prepared(
     )
     .limit(1)
 )
-_INSERT_IMPACT = Prepared(insert(impacts), [column.name for column in impacts.c])
-_INSERT_REVISION = Prepared(insert(impact_revisions), [column.name for column in impact_revisions.c])
-_INSERT_SCORE = Prepared(insert(scores), [column.name for column in scores.c])
+_INTERNAL = frozenset({"data_set_id", "external_id_digest", "score_number"})
 _UPDATE = update(impacts).where(impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact"))
 _SUPERSEDE = update(impact_revisions).where(
     impact_revisions.c.impact_id == bindparam("impact"), impact_revisions.c.revision == bindparam("before")
@@ -174,21 +173,11 @@ def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, impact_id:
 def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact:
     """Three rows: the impact, its first revision with the trace, its score."""
     now = later_than(known.last_change)
-    members = _members(conn, data_set_id, new, known) | {
-        "id": ids.new(),
-        "external_id": new.external_id,
-        "duplicate_of": known.same_content,
-        "revision": 1,
-        "created_at": now,
-        "updated_at": now,
-        "deleted_at": None,
-    }
-    digest = external_id_digest(data_set_id, new.external_id)
-    row = members | {"data_set_id": data_set_id, "external_id_digest": digest, "score_number": 1}
-    _INSERT_IMPACT.run(conn, row)
-    _insert_revision(conn, new, row, now)
+    athlete_id, device_id = _athlete_and_device(conn, data_set_id, new, known)
+    row = first_row(data_set_id, new, athlete_id, device_id, now) | {"duplicate_of": known.same_content}
+    insert_rows(conn, [(new, row)])
     return Impact(
-        **members,
+        **{name: value for name, value in row.items() if name not in _INTERNAL},
         athlete_external_id=new.athlete_external_id if new.athlete_id is None else known.athlete_external_id,
         device_serial=new.device_serial,
         document=new.document,
@@ -196,45 +185,17 @@ def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known)
     )
 
 
-def _members(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> dict[str, Any]:
-    """The columns that a correction replaces; athlete and device are made if they are new."""
+def _athlete_and_device(
+    conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known
+) -> tuple[bytes | None, bytes | None]:
+    """Their ids; each is made if it is new."""
     athlete_id = known.athlete_by_id or known.athlete_by_name
     if athlete_id is None and new.athlete_external_id is not None:
         athlete_id = athlete_store.ensure(conn, data_set_id, new.athlete_external_id)
     device_id = known.device
     if device_id is None and new.device_serial is not None:
         device_id = device_store.ensure(conn, data_set_id, new.device_serial)
-    return {
-        "athlete_id": athlete_id,
-        "device_id": device_id,
-        "occurred_at": new.occurred_at,
-        "session_id": new.session_id,
-        "activity": new.activity,
-        "sport": new.sport,
-        "position": new.position,
-        "context": new.context,
-        "input_digest": new.input_digest,
-    }
-
-
-def _insert_revision(conn: Connection, new: NewImpact, row: dict[str, Any], now: datetime) -> None:
-    """The revision that an impact's row names, with its trace and its score."""
-    impact_id, revision = row["id"], row["revision"]
-    kept = {
-        "impact_id": impact_id,
-        "revision": revision,
-        "data_set_id": row["data_set_id"],
-        "athlete_id": row["athlete_id"],
-        "content_digest": new.content_digest,
-        "input_digest": new.input_digest,
-        "document": new.document,
-        "key_id": new.key_id,
-        "created_at": now,
-        "superseded_at": None,
-        "trace": new.trace,
-    }
-    _INSERT_REVISION.run(conn, kept)
-    _INSERT_SCORE.run(conn, row_of(new.score, impact_id, row["score_number"], revision, now))
+    return athlete_id, device_id
 
 
 def correct(
@@ -253,7 +214,8 @@ def correct(
         return Outcome("unchanged", present)
     require_revision(present.revision, if_match)
     known = _look_up(conn, data_set_id, new)
-    changed = _name(data_set_id, present, new, known) | _members(conn, data_set_id, new, known)
+    content = content_members(new, *_athlete_and_device(conn, data_set_id, new, known))
+    changed = _name(data_set_id, present, new, known) | content
     now = next_change(conn, impacts, data_set_id)
     changed |= {
         "duplicate_of": find_same_content(conn, data_set_id, new.input_digest, exclude=impact_id),
@@ -263,7 +225,7 @@ def correct(
     }
     conn.execute(_UPDATE, changed | {"of_data_set": data_set_id, "impact": impact_id})
     conn.execute(_SUPERSEDE, {"impact": impact_id, "before": present.revision, "superseded_at": now})
-    _insert_revision(conn, new, changed | {"data_set_id": data_set_id, "id": impact_id}, now)
+    insert_revisions(conn, [(new, changed | {"data_set_id": data_set_id, "id": impact_id})])
     return Outcome("corrected", _require(conn, data_set_id, impact_id))
 
 

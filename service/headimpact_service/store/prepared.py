@@ -34,6 +34,15 @@ class _Plan:
     results: tuple[tuple[int, _Convert], ...] | None = None
     """What converts some columns of a row; known with the first, as it depends on what the driver calls their types."""
 
+    def parameters(self, values: Mapping[str, Any]) -> list[Any] | dict[str, Any]:
+        """The values as the driver takes them."""
+        if self.defaults:
+            values = self.defaults | dict(values)
+        row = list(self.ordered(values))
+        for at, bind in self.binds:
+            row[at] = bind(row[at])
+        return row if self.positional else dict(zip(self.names, row, strict=True))
+
 
 class Prepared:
     """A statement with named parameters, compiled once for each dialect; it runs in the connection's transaction."""
@@ -47,6 +56,12 @@ class Prepared:
     def run(self, conn: Connection, values: Mapping[str, Any]) -> None:
         """Run an insert."""
         self._execute(conn, self._plan(conn.dialect), values).close()
+
+    def run_many(self, conn: Connection, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Run an insert for every row."""
+        plan = self._plan(conn.dialect)
+        parameters = [plan.parameters(values) for values in rows]
+        self._call(conn, plan, lambda cursor: cursor.executemany(plan.sql, parameters)).close()
 
     def first(self, conn: Connection, values: Mapping[str, Any]) -> list[Any] | None:
         """The first row of a query with each value as its column's type has it, or None."""
@@ -64,18 +79,16 @@ class Prepared:
         return read
 
     def _execute(self, conn: Connection, plan: _Plan, values: Mapping[str, Any]) -> Any:  # noqa: ANN401 - a driver's cursor
+        parameters = plan.parameters(values)
+        return self._call(conn, plan, lambda cursor: cursor.execute(plan.sql, parameters))
+
+    def _call(self, conn: Connection, plan: _Plan, run: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - a driver's cursor
         if not conn.in_transaction():
             conn.begin()
-        if plan.defaults:
-            values = plan.defaults | dict(values)
-        row = list(plan.ordered(values))
-        for at, bind in plan.binds:
-            row[at] = bind(row[at])
-        parameters = row if plan.positional else dict(zip(plan.names, row, strict=True))
         cursor = conn.connection.cursor()
         driver = conn.dialect.loaded_dbapi
         try:
-            cursor.execute(plan.sql, parameters)
+            run(cursor)
         except driver.Error as error:  # as SQLAlchemy raises it, so that nobody need know who ran the statement
             cursor.close()
             raise DBAPIError.instance(
