@@ -19,7 +19,7 @@ from headimpact_service.intake.facts import facts_in
 from headimpact_service.intake.records import describe, kinematics_document
 from headimpact_service.intake.rendering import new_score, score_document
 from headimpact_service.intake.scoring import DeviceFacts, Scored, Terms, score_records
-from headimpact_service.intake.storing import new_impact
+from headimpact_service.intake.storing import new_impacts
 from headimpact_service.store import ids
 from headimpact_service.store.impact_batches import Added, add_many
 from headimpact_service.store.impact_rows import NewImpact
@@ -68,14 +68,12 @@ def _item(record: ImpactRecord | Problem, scored: Scored | Problem | None) -> It
     return Item(record.external_id, scored, content_digest(record, sent_digest))
 
 
-def make_ready(items: Iterable[Item], key_id: bytes | None) -> list[Ready]:
+def make_ready(items: Sequence[Item], key_id: bytes | None) -> list[Ready]:
     """The rows of the store."""
+    scored = [(item.outcome, item.sent_digest) for item in items if isinstance(item.outcome, Scored)]
+    made = iter(new_impacts(scored, key_id))
     return [
-        Ready(
-            item.external_id,
-            item.outcome if isinstance(item.outcome, Problem) else new_impact(item.outcome, item.sent_digest, key_id),
-        )
-        for item in items
+        Ready(item.external_id, item.outcome if isinstance(item.outcome, Problem) else next(made)) for item in items
     ]
 
 

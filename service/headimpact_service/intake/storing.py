@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from headimpact_service.intake.records import arrays, describe
 from headimpact_service.intake.rendering import new_score
 from headimpact_service.intake.scoring import Scored
@@ -13,6 +15,16 @@ _COLUMNS = ("session_id", "activity", "sport", "position")
 
 def new_impact(scored: Scored, sent_content_digest: bytes, key_id: bytes | None) -> NewImpact:
     """What is stored of a record and its score."""
+    return new_impacts([(scored, sent_content_digest)], key_id)[0]
+
+
+def new_impacts(scored: Sequence[tuple[Scored, bytes]], key_id: bytes | None) -> list[NewImpact]:
+    """The same of many, each with the digest of what was sent."""
+    encoded = traces.encode_many([arrays(item.record.recording) for item, _ in scored])
+    return [_new(item, digest, key_id, trace) for (item, digest), trace in zip(scored, encoded, strict=True)]
+
+
+def _new(scored: Scored, sent_content_digest: bytes, key_id: bytes | None, trace: bytes) -> NewImpact:
     record = scored.record
     context = record.context
     rest = {name: value for name, value in context.items() if name not in _COLUMNS}
@@ -20,7 +32,7 @@ def new_impact(scored: Scored, sent_content_digest: bytes, key_id: bytes | None)
         content_digest=sent_content_digest,
         input_digest=scored.input_digest,
         document=describe(record),
-        trace=traces.encode(arrays(record.recording)),
+        trace=trace,
         score=new_score(scored),
         external_id=record.external_id,
         athlete_id=None if record.athlete_id is None else (ids.decode("ath", record.athlete_id) or UNKNOWN_ATHLETE),

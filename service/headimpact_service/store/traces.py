@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,10 @@ DECIMAL = 16
 """The form of multiples of 10^-d is this plus d."""
 DIGITS = (2, 4, 6)
 _GLANCE = 8
+_MANY = 4
+"""Impacts from which on it is cheaper to put them together."""
+_TOGETHER = 64 * 1024
+"""Samples that are put into their form together: what of them is held in between stays in the processor's cache."""
 
 
 class TraceCodecError(ValueError):
@@ -38,11 +43,10 @@ class TraceCodecError(ValueError):
 
 
 class _Stored(NamedTuple):
-    """An array in its form: `plane` is one-dimensional, component by component."""
+    """One array in its form, as the bytes that are compressed."""
 
     form: int
-    shape: tuple[int, ...]
-    plane: NDArray[np.float32] | NDArray[np.float64] | NDArray[np.int32]
+    plane: bytes
 
 
 def encode(signals: Mapping[str, FloatArray]) -> bytes:
@@ -52,8 +56,8 @@ def encode(signals: Mapping[str, FloatArray]) -> bytes:
     with np.errstate(over="ignore", invalid="ignore"):  # a form that cannot hold a value is not the one chosen
         for name, values in signals.items():
             stored = _stored(np.asarray(values, dtype=np.float64))
-            header += _entry(name, stored)
-            planes.append(stored.plane.view(np.uint8).reshape(-1, stored.plane.itemsize).T.tobytes())
+            header += _entry(name, values.shape, stored.form)
+            planes.append(stored.plane)
     return bytes(header) + zstandard.ZstdCompressor(write_checksum=True).compress(b"".join(planes))
 
 
@@ -64,11 +68,16 @@ def _stored(values: FloatArray) -> _Stored:
     if digits is not None:
         whole = np.rint(rows * 10.0**digits).astype(np.int32)
         if _same_bits(whole / 10.0**digits, rows):  # neither -0.0 nor a multiple beyond int32 comes back
-            return _Stored(DECIMAL + digits, values.shape, _differences(whole))
+            return _Stored(DECIMAL + digits, _plane(_differences(whole)))
     single = rows.astype(np.float32)
     if _same_bits(single.astype(np.float64), rows):
-        return _Stored(SINGLE, values.shape, single.reshape(-1))
-    return _Stored(DOUBLE, values.shape, rows.reshape(-1))
+        return _Stored(SINGLE, _plane(single.reshape(-1)))
+    return _Stored(DOUBLE, _plane(rows.reshape(-1)))
+
+
+def _plane(stored: NDArray[np.float32] | NDArray[np.float64] | NDArray[np.int32]) -> bytes:
+    """The bytes of an array, those of equal weight together."""
+    return stored.view(np.uint8).reshape(-1, stored.itemsize).T.tobytes()
 
 
 def _digits(rows: FloatArray) -> int | None:
@@ -89,12 +98,94 @@ def _differences(whole: NDArray[np.int32]) -> NDArray[np.int32]:
     return steps
 
 
-def _entry(name: str, stored: _Stored) -> bytes:
+def encode_many(items: Sequence[Mapping[str, FloatArray]]) -> list[bytes]:
+    """The arrays of many impacts, each as :func:`encode` has them; those of equal names and shapes are put together."""
+    if len(items) < _MANY:
+        return [encode(signals) for signals in items]
+    groups: dict[tuple[tuple[str, tuple[int, ...]], ...], list[int]] = {}
+    for index, signals in enumerate(items):
+        groups.setdefault(tuple((name, values.shape) for name, values in signals.items()), []).append(index)
+    compress = zstandard.ZstdCompressor(write_checksum=True).compress
+    encoded = [b""] * len(items)
+    for layout, members in groups.items():
+        columns = [_stored_many([items[index][name] for index in members]) for name, _ in layout]
+        for index, *arrays in zip(members, *columns, strict=True):
+            head = [_entry(name, shape, stored.form) for (name, shape), stored in zip(layout, arrays, strict=True)]
+            planes = b"".join([stored.plane for stored in arrays])
+            encoded[index] = bytes((CODEC, len(layout))) + b"".join(head) + compress(planes)
+    return encoded
+
+
+def _stored_many(arrays: Sequence[FloatArray]) -> list[_Stored]:
+    """Arrays of one shape in their forms."""
+    together = max(1, _TOGETHER // max(1, arrays[0].size))
+    stored: list[_Stored] = []
+    with np.errstate(over="ignore", invalid="ignore"):  # a form that cannot hold a value is not the one chosen
+        for first in range(0, len(arrays), together):
+            rows = [np.asarray(values, dtype=np.float64).T.reshape(-1) for values in arrays[first : first + together]]
+            stored += _in_forms(np.stack(rows))
+    return stored
+
+
+def _in_forms(rows: FloatArray) -> list[_Stored]:
+    """Rows in the smallest form from which every bit comes back: what is written in decimals is no float32."""
+    found: dict[int, _Stored] = {}
+    digits = _digits_many(rows[:, :_GLANCE])
+    for form in DIGITS:
+        of_form = np.flatnonzero(digits == form)
+        if of_form.size:
+            values = rows[of_form]
+            whole = np.rint(values * 10.0**form).astype(np.int32)
+            same = _same_rows(whole / 10.0**form, values)  # neither -0.0 nor a multiple beyond int32 comes back
+            found.update(_planes(of_form[same], DECIMAL + form, _differences_many(whole[same])))
+    rest = np.array([row for row in range(len(rows)) if row not in found], dtype=np.intp)
+    if rest.size:
+        values = rows[rest]
+        single = values.astype(np.float32)
+        same = _same_rows(single.astype(np.float64), values)
+        found.update(_planes(rest[same], SINGLE, single[same]))
+        found.update(_planes(rest[~same], DOUBLE, values[~same]))
+    return [found[row] for row in range(len(rows))]
+
+
+def _digits_many(few: FloatArray) -> NDArray[np.int64]:
+    """How many decimals the samples of each row may have, by a glance at the first few; -1 for none of ours."""
+    digits = np.full(len(few), -1, dtype=np.int64)
+    for form in reversed(DIGITS):
+        digits[(np.rint(few * 10.0**form) / 10.0**form == few).all(axis=1)] = form
+    return digits
+
+
+def _same_rows(found: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
+    """Of each row, whether all of it is the same."""
+    same: NDArray[np.bool_] = (found.view(np.int64) == values.view(np.int64)).all(axis=1)
+    return same
+
+
+def _differences_many(whole: NDArray[np.int32]) -> NDArray[np.int32]:
+    """From sample to sample, the first as it is. Beyond the range of int32 they wrap, there and back."""
+    steps = whole.copy()
+    steps[:, 1:] -= whole[:, :-1]
+    return steps
+
+
+def _planes(
+    rows: NDArray[np.intp], form: int, stored: NDArray[np.float32] | NDArray[np.float64] | NDArray[np.int32]
+) -> Iterator[tuple[int, _Stored]]:
+    """The bytes of each row, those of equal weight together."""
+    count, size = stored.shape
+    parted = stored.view(np.uint8).reshape(count, size, stored.itemsize).transpose(0, 2, 1)
+    for row, plane in zip(rows.tolist(), np.ascontiguousarray(parted), strict=True):
+        yield row, _Stored(form, plane.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _entry(name: str, shape: tuple[int, ...], form: int) -> bytes:
     label = name.encode()
-    if len(label) > _MAX_NAME or len(stored.shape) not in {1, 2}:
+    if len(label) > _MAX_NAME or len(shape) not in {1, 2}:
         raise TraceCodecError("A signal has a name of up to 255 bytes and one or two dimensions.")
-    rows, columns = stored.shape if len(stored.shape) == 2 else (stored.shape[0], 1)
-    return _ENTRY.pack(len(label), stored.form, len(stored.shape), rows, columns) + label
+    rows, columns = shape if len(shape) == 2 else (shape[0], 1)
+    return _ENTRY.pack(len(label), form, len(shape), rows, columns) + label
 
 
 def decode(data: bytes) -> dict[str, FloatArray]:

@@ -40,6 +40,25 @@ def test_every_bit_of_every_array_comes_back(signals: dict[str, np.ndarray]) -> 
         assert decoded[name].tobytes() == np.ascontiguousarray(values).tobytes()
 
 
+@given(st.lists(st.dictionaries(st.sampled_from(["a", "b"]), any_bits | single | decimal), min_size=4, max_size=9))
+def test_every_bit_comes_back_of_what_is_encoded_together(items: list[dict[str, np.ndarray]]) -> None:
+    twice = [*items, *reversed(items)]
+    for signals, encoded in zip(twice, traces.encode_many(twice), strict=True):
+        decoded = traces.decode(encoded)
+        assert {name: (values.shape, values.tobytes()) for name, values in decoded.items()} == {
+            name: (values.shape, np.ascontiguousarray(values).tobytes()) for name, values in signals.items()
+        }
+
+
+@pytest.mark.parametrize("together", [1, 700, 10**6])
+def test_impacts_encoded_together_have_the_bytes_of_each(together: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(traces, "_TOGETHER", together)
+    kinds = [40 * WAVE, np.round(40 * WAVE, 2), np.round(40 * WAVE, 6), WAVE.astype(np.float32).astype(np.float64)]
+    items = [{"a": kind * scale, "b": kind[:50]} for kind in kinds for scale in (1.0, 2.0, -1.0)]
+    items += [{"a": WAVE[:, 0]}, {}]
+    assert traces.encode_many(items) == [traces.encode(signals) for signals in items]
+
+
 def test_a_strided_view_is_stored_as_its_values() -> None:
     assert np.array_equal(traces.decode(traces.encode({"a": WAVE[::2, ::-1]}))["a"], WAVE[::2, ::-1])
 
@@ -83,6 +102,8 @@ def test_multiples_that_the_first_codec_wrote_are_read_for_ever() -> None:
 def test_a_signal_of_three_dimensions_is_refused() -> None:
     with pytest.raises(TraceCodecError, match="dimensions"):
         traces.encode({"a": np.zeros((2, 2, 2))})
+    with pytest.raises(TraceCodecError):
+        traces.encode_many([{"a": np.zeros((2, 2, 2))}] * 5)
 
 
 def test_a_name_of_more_than_255_bytes_is_refused() -> None:
