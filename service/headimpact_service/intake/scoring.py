@@ -107,11 +107,7 @@ def score_records(records: Iterable[tuple[ImpactRecord, DeviceFacts]], terms: Te
 
     What they hold in memory beside the records is bounded: they are taken part by part, and their motion is let go.
     """
-    return [
-        replace(item, preparation=None) if isinstance(item, Scored) else item
-        for part in parts(records, _values, TOGETHER)
-        for item in _scored(part, terms)
-    ]
+    return [item for part in parts(records, _values, TOGETHER) for item in _scored(part, terms)]
 
 
 def _values(pair: tuple[ImpactRecord, DeviceFacts]) -> int:
@@ -119,33 +115,34 @@ def _values(pair: tuple[ImpactRecord, DeviceFacts]) -> int:
 
 
 def _scored(records: Sequence[tuple[ImpactRecord, DeviceFacts]], terms: Terms) -> list[Scored | Problem]:
-    """A part of them, each with its preparation."""
-    results = _prepared([_asked_or_problem(record, terms, device) for record, device in records])
-    batches: dict[tuple[str, ...], list[int]] = {}
-    for index, item in enumerate(results):
-        if isinstance(item, Scored) and item.preparation is not None:
-            batches.setdefault(item.record.extra_criteria, []).append(index)
-    for extra, members in batches.items():
-        ready = [item for index in members if isinstance(item := results[index], Scored)]
-        preparations = [item.preparation for item in ready if item.preparation is not None]
-        found = score_many(preparations, terms.model, incidence=terms.incidence, extra_criteria=extra)
-        for index, item, result in zip(members, ready, found, strict=True):
-            results[index] = replace(item, score=result)
-    return results
-
-
-def _prepared(results: list[Scored | Problem]) -> list[Scored | Problem]:
-    """Those that are to be scored with their preparation, or the problem that it met."""
-    members = [index for index, item in enumerate(results) if isinstance(item, Scored) and not item.reasons]
-    recordings = [item.record.recording for index in members if isinstance(item := results[index], Scored)]
-    for index, found in zip(members, prepare_many(recordings), strict=True):
-        item = results[index]
-        assert isinstance(item, Scored)
-        if isinstance(found, TraceError):
-            results[index] = trace_problem(found, item.record.recording)
+    """A part of them."""
+    asked = [_asked_or_problem(record, terms, device) for record, device in records]
+    to_score = [item for item in asked if isinstance(item, Scored) and not item.reasons]
+    found = iter(_scores([item.record for item in to_score], terms))
+    results: list[Scored | Problem] = []
+    for item in asked:
+        if isinstance(item, Problem) or item.reasons:
+            results.append(item)
         else:
-            results[index] = replace(item, preparation=found)
+            result = next(found)
+            results.append(result if isinstance(result, Problem) else replace(item, score=result))
     return results
+
+
+def _scores(records: Sequence[ImpactRecord], terms: Terms) -> list[ImpactScore | Problem]:
+    """The score of each, those that are asked for the same extra criteria together, or the problem that it met."""
+    results: dict[int, ImpactScore | Problem] = {}
+    batches: dict[tuple[str, ...], list[tuple[int, Preparation]]] = {}
+    for index, preparation in enumerate(prepare_many([record.recording for record in records])):
+        if isinstance(preparation, TraceError):
+            results[index] = trace_problem(preparation, records[index].recording)
+        else:
+            batches.setdefault(records[index].extra_criteria, []).append((index, preparation))
+    for extra, members in batches.items():
+        preparations = [preparation for _, preparation in members]
+        scores = score_many(preparations, terms.model, incidence=terms.incidence, extra_criteria=extra)
+        results.update((index, found) for (index, _), found in zip(members, scores, strict=True))
+    return [results[index] for index in range(len(records))]
 
 
 def _asked_or_problem(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored | Problem:
