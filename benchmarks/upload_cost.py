@@ -49,7 +49,7 @@ def main() -> None:
             spend("single requests", single, number)
             for at, kind in enumerate(TYPES, start=1):
                 file = Path(name) / f"{number}.{kind}"
-                write_file(file, options.impacts, kind, least=1 + (at + 4 * number + 4) / 1e4)
+                write_file(file, options.impacts, kind, least=1 + 0.00037 * (at + 4 * number + 4))
                 spend(kind, upload, file, kind)
             if number < 0:
                 costs.clear()  # what is loaded and compiled once
