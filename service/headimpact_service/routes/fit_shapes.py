@@ -8,7 +8,6 @@ from pydantic import AfterValidator, Field, model_validator
 
 from headimpact.criteria import CRITERION_KEYS
 from headimpact_service.ingest.impact_json import CriterionKey, Fraction, Moment, Strict, Text, Word
-from headimpact_service.intake import registry
 from headimpact_service.intake.scoring import Terms
 
 MAX_REPLICAS = 10_000
@@ -48,7 +47,9 @@ class FitBody(Strict):
         default="case_control",
         description="`case_control` where impacts were chosen by their outcome: intercepts go to `incidence`.",
     )
-    incidence: Fraction | None = Field(default=None, description="The active settings' unless given.")
+    incidence: Fraction | None = Field(
+        default=None, description="What GET /v1/settings shows unless given."
+    )
     incidence_range: Annotated[list[Fraction], Field(min_length=2, max_length=2)] | None = None
     bias_correction: Literal["king_zeng", "firth", "zelig", "none"] = "king_zeng"
     replicas: Annotated[int, Field(ge=0, le=MAX_REPLICAS)] = 1000
@@ -102,5 +103,5 @@ def stored(body: FitBody, terms: Terms) -> dict[str, Any]:
     """A fit as jobs and schedules keep it: JSON, complete, with the incidence that holds now."""
     document = body.model_dump(mode="json", exclude_none=True)
     if body.sampling == "case_control":
-        document.setdefault("incidence", terms.incidence or registry.DEFAULT.incidence)
+        document.setdefault("incidence", terms.incidence or terms.model.incidence)
     return document

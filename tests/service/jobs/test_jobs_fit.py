@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from importlib import import_module
 from pathlib import Path
@@ -15,13 +16,16 @@ import pytest
 from cohorts import fill, spring_document
 from sending import Api, impact_body
 
+from headimpact.risk import LAKSARI_2020
 from headimpact_service.cli import refit as refit_command
 from headimpact_service.deps import SCOPES
 from headimpact_service.intake.cron import next_due
+from headimpact_service.intake.scoring import Terms
 from headimpact_service.jobs import runs
 from headimpact_service.jobs.engine import KINDS
 from headimpact_service.jobs.fit import Fit, _register
 from headimpact_service.jobs.runs import House
+from headimpact_service.routes.fit_shapes import FitBody, stored
 from headimpact_service.store import ids, job_runs, jobs, keys, labels, schedules
 from headimpact_service.store.database import Database
 from headimpact_service.store.labels import NewLabel
@@ -455,6 +459,14 @@ class TestSchedules:
         assert api.get("/v1/schedules/weekly", key=other).status_code == 404
         assert api.get("/v1/schedules", key=other).json()["data"] == []
         assert api.delete("/v1/schedules/weekly", key=other).status_code == 404
+
+
+def test_a_fit_is_for_the_incidence_that_is_served() -> None:
+    own = replace(LAKSARI_2020, version="own", incidence=0.02)
+    assert stored(FitBody(), Terms())["incidence"] == 0.0055
+    assert stored(FitBody(), Terms(model=own))["incidence"] == 0.02
+    assert stored(FitBody(), Terms(incidence=0.01, model=own))["incidence"] == 0.01
+    assert stored(FitBody(incidence=0.03), Terms(incidence=0.01, model=own))["incidence"] == 0.03
 
 
 def test_a_job_of_another_version_is_not_forgotten(database: Database, mine: bytes) -> None:
