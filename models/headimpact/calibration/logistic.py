@@ -170,7 +170,8 @@ def require_fittable(sample: Sample) -> None:
         raise CalibrationError("no-non-events", "Every impact has the outcome concussion.")
     constant = np.flatnonzero((sample.x == sample.x[0]).all(axis=0)).tolist()
     if constant:
-        raise CalibrationError("constant-predictor", f"Predictor {constant[0] + 1} has one value in every impact.")
+        of_which = "" if sample.x.shape[1] == 1 else f" number {constant[0] + 1}"
+        raise CalibrationError("constant-predictor", f"The predictor{of_which} has one value in every impact.")
     if np.linalg.matrix_rank(sample.design / sample.scale) < sample.design.shape[1]:
         raise CalibrationError("collinear", "The predictors are linear combinations of each other.")
 

@@ -101,8 +101,19 @@ def refit(cohort: Cohort, options: RefitOptions | None = None, active: RiskModel
         except CalibrationError as error:
             failed[name] = error
     if not criteria:
-        raise next(iter(failed.values()), CalibrationError("no-criteria", "The cohort has no values of any criterion."))
+        raise _nothing_fitted(failed)
     return Refit(cohort, options, criteria, failed, _comparisons(criteria), None if active is None else active.version)
+
+
+def _nothing_fitted(failed: Mapping[str, CalibrationError]) -> CalibrationError:
+    """Why no criterion could be fitted, each reason under the criteria that met it."""
+    if not failed:
+        return CalibrationError("no-criteria", "The cohort has no values of any criterion.")
+    met: dict[str, list[str]] = {}
+    for name, error in failed.items():
+        met.setdefault(str(error), []).append(name)
+    told = " ".join(f"{', '.join(names)}: {reason}" for reason, names in met.items())
+    return CalibrationError(next(iter(failed.values())).code, f"No criterion could be fitted. {told}")
 
 
 def _setting(cohort: Cohort, options: RefitOptions) -> Setting:

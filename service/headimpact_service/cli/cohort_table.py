@@ -9,7 +9,7 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import inf, isinf, nan
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,8 @@ PARQUET_MAGIC = b"PAR1"
 GZIP_MAGIC = b"\x1f\x8b"
 NOTHING = frozenset({"", "NA"})
 """Cells without a value; R writes the second."""
+IMPACT_ID = "imp_"
+"""How the service's own ids begin; in other tables a column `id` may be anything."""
 TRUTHS = {"true": "1", "false": "0"}
 """Outcomes of data frames whose column is logical, whatever their case."""
 
@@ -105,6 +107,7 @@ def read_cohort(path: Path, include: frozenset[str] = frozenset()) -> CohortTabl
     if missing:
         raise TableError(f"The table has no column {missing[0]}; its columns are: {', '.join(list(columns)[:30])}.")
     keys = _criteria(columns)
+    _require_once(columns)
     outcome = [_outcome(cell, row) for row, cell in enumerate(columns["outcome"])]
     reasons = _exclusions(columns, outcome, include)
     entering = [row for row, reason in enumerate(reasons) if reason is None]
@@ -219,6 +222,17 @@ def _outcome(cell: Any, row: int) -> float | None:  # noqa: ANN401 - a cell of a
         raise TableError(f"Row {row}, column outcome: {error}") from None
 
 
+def _require_once(columns: Mapping[str, Sequence[Any]]) -> None:
+    """Refuse a table in which one of the service's impacts stands twice: it would count twice, or contradict itself."""
+    first: dict[str, int] = {}
+    for row, cell in enumerate(columns.get("id", ())):
+        name = _text(cell)
+        if name.startswith(IMPACT_ID) and first.setdefault(name, row) != row:
+            labels = [_text(columns["outcome"][at]) or "nothing" for at in (first[name], row)]
+            told = "twice" if labels[0] == labels[1] else f"with the outcomes {' and '.join(labels)}"
+            raise TableError(f"The impact {name} stands {told}, in rows {first[name]} and {row}.")
+
+
 def _exclusions(
     columns: Mapping[str, Sequence[Any]], outcome: Sequence[float | None], include: frozenset[str]
 ) -> list[str | None]:
@@ -260,7 +274,9 @@ def _numbers(columns: Mapping[str, Sequence[Any]], name: str, rows: Sequence[int
         try:
             found[i] = float(cell)
         except (TypeError, ValueError):
-            raise TableError(f"Row {row}, column {name}: a number or an empty cell is needed.") from None
+            found[i] = inf
+        if isinf(found[i]):
+            raise TableError(f"Row {row}, column {name}: a finite number or an empty cell is needed.")
     return found
 
 

@@ -47,9 +47,7 @@ class FitBody(Strict):
         default="case_control",
         description="`case_control` where impacts were chosen by their outcome: intercepts go to `incidence`.",
     )
-    incidence: Fraction | None = Field(
-        default=None, description="What GET /v1/settings shows unless given."
-    )
+    incidence: Fraction | None = Field(default=None, description="What GET /v1/settings shows unless given.")
     incidence_range: Annotated[list[Fraction], Field(min_length=2, max_length=2)] | None = None
     bias_correction: Literal["king_zeng", "firth", "zelig", "none"] = "king_zeng"
     replicas: Annotated[int, Field(ge=0, le=MAX_REPLICAS)] = 1000
