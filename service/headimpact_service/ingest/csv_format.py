@@ -27,14 +27,13 @@ from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
-from headimpact_service.ingest.text_facts import text_facts, unreadable
+from headimpact_service.ingest.text_facts import delimiter_of, text_facts, unreadable
 
 if TYPE_CHECKING:
     from _csv import Reader
 
 MAX_COLUMNS = 1024
 ROWS_AT_ONCE = 4096
-_DELIMITERS = (",", ";", "\t")
 _SEPARATOR = re.compile(r"sep=.\s*", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*")
 Block = tuple[FloatArray, Sequence[Sequence[str]]]
@@ -69,7 +68,7 @@ class CsvTable:
         self._quoted = text.quoted
         self._line = 0
         heading = self._first_line(skip_rows)
-        self._delimiter = _delimiter(heading)
+        self._delimiter = delimiter_of(heading)
         self._decimal_mark = ""
         self._decimal_commas = text.has_decimal_commas(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
@@ -184,17 +183,6 @@ def _lines(stream: BinaryIO, encoding: str) -> Iterator[str]:
     finally:
         with suppress(ValueError):  # the owner has closed it before
             text.detach()
-
-
-def _delimiter(heading: str) -> str:
-    """The one separator of the headings outside quotes; where two occur, the one that occurs more often."""
-    bare = re.sub(r'"[^"]*"', "", heading)
-    counts = sorted(((bare.count(delimiter), delimiter) for delimiter in _DELIMITERS), reverse=True)
-    if counts[0][0] == 0:
-        raise unreadable("The headings are not separated by commas, semicolons or tabs.")
-    if counts[0][0] == counts[1][0]:
-        raise unreadable("The headings hold two separators equally often: use one for the whole file.")
-    return counts[0][1]
 
 
 def _simply_quoted(delimiter: str) -> re.Pattern[str]:

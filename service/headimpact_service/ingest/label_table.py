@@ -14,6 +14,7 @@ from pydantic_core import to_json
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.ingest.json_faults import parse
+from headimpact_service.ingest.text_facts import delimiter_of
 
 MAX_ROWS = 50_000
 IMPACT = ("impact_id", "external_id")
@@ -56,8 +57,10 @@ def _rows(data: bytes) -> Iterator[list[str]]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise _unreadable("The table is not text in UTF-8.") from None
+    heading = next((line for line in text.splitlines() if line.strip()), "")
+    delimiter = delimiter_of(heading) if heading else ","
     try:
-        yield from (row for row in csv.reader(io.StringIO(text, newline=""), strict=True) if row)
+        yield from (row for row in csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True) if row)
     except csv.Error as error:
         raise _unreadable(f"The table is no CSV: {error}.") from None
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from sqlalchemy import BindParameter, Connection, bindparam, func, select, update
+from sqlalchemy import BindParameter, Connection, bindparam, select, update
 
 from headimpact_service.errors import PayloadError, Problem, not_found
 from headimpact_service.store import athletes as athlete_store
@@ -61,11 +61,17 @@ class _Known(NamedTuple):
 
     last_change: datetime | None
     athlete_by_name: bytes | None
+    merged_into: bytes | None
     athlete_by_id: bytes | None
     athlete_external_id: str | None
     device: bytes | None
     same_external_id: bytes | None
     same_content: bytes | None
+
+    @property
+    def athlete(self) -> bytes | None:
+        """Whose the impact is, if that athlete is known: of one that was merged, into whom."""
+        return self.athlete_by_id or self.merged_into or self.athlete_by_name
 
 
 _ATHLETE_BY_ID = (
@@ -73,12 +79,15 @@ _ATHLETE_BY_ID = (
     athletes.c.data_set_id == _DATA_SET,
     athletes.c.deleted_at.is_(None),
 )
+_ATHLETE_BY_NAME = (
+    athletes.c.data_set_id == _DATA_SET,
+    athletes.c.external_id == bindparam("athlete_external_id"),
+)
 _KNOWN = Prepared(
     select(
         last_change(impacts),
-        select(func.coalesce(athletes.c.merged_into, athletes.c.id))
-        .where(athletes.c.data_set_id == _DATA_SET, athletes.c.external_id == bindparam("athlete_external_id"))
-        .scalar_subquery(),
+        select(athletes.c.id).where(*_ATHLETE_BY_NAME).scalar_subquery(),
+        select(athletes.c.merged_into).where(*_ATHLETE_BY_NAME).scalar_subquery(),
         select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),
         select(athletes.c.external_id).where(*_ATHLETE_BY_ID).scalar_subquery(),
         select(devices.c.id)
@@ -147,7 +156,7 @@ def _look_up(conn: Connection, data_set_id: bytes, new: NewImpact) -> _Known:
 
 def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact | None:
     """The stored impact of the same athlete, instant and input."""
-    athlete_id = known.athlete_by_id or known.athlete_by_name
+    athlete_id = known.athlete
     if athlete_id is None and new.athlete_external_id is not None:
         return None  # an athlete never seen before has no impacts
     parameters = {
@@ -178,18 +187,27 @@ def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known)
     insert_rows(conn, [(new, row)])
     return Impact(
         **{name: value for name, value in row.items() if name not in _INTERNAL},
-        athlete_external_id=new.athlete_external_id if new.athlete_id is None else known.athlete_external_id,
+        athlete_external_id=_athlete_external_id(conn, data_set_id, new, known),
         device_serial=new.device_serial,
         document=new.document,
         score=stored(new.score, row["id"], 1, 1, now),
     )
 
 
+def _athlete_external_id(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> str | None:
+    """What the impact's athlete is called: as it was sent, unless it was sent by our id or that athlete was merged."""
+    if new.athlete_id is not None:
+        return known.athlete_external_id
+    if known.merged_into is None:
+        return new.athlete_external_id
+    return athlete_store.require(conn, data_set_id, known.merged_into).external_id
+
+
 def _athlete_and_device(
     conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known
 ) -> tuple[bytes | None, bytes | None]:
     """Their ids; each is made if it is new."""
-    athlete_id = known.athlete_by_id or known.athlete_by_name
+    athlete_id = known.athlete
     if athlete_id is None and new.athlete_external_id is not None:
         athlete_id = athlete_store.ensure(conn, data_set_id, new.athlete_external_id)
     device_id = known.device

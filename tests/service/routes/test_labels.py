@@ -180,6 +180,13 @@ class TestDiagnoses:
 
 
 class TestTables:
+    @pytest.mark.parametrize("delimiter", [";", "\t"])
+    def test_a_spreadsheet_may_separate_by_something_else(self, api: Api, delimiter: str) -> None:
+        api.create("e-1")
+        lines = [("external_id", "outcome", "basis"), ("e-1", "no_concussion", "follow_up")]
+        text = "\ufeff" + "\r\n".join(delimiter.join(line) for line in lines)
+        assert self.send(api, text).json()["summary"]["labelled"] == 1
+
     def send(self, api: Api, text: str, **request: Any) -> Any:
         headers = {"content-type": "text/csv"}
         return api.post("/v1/labels", content=text.encode(), headers=headers, **request)
@@ -276,7 +283,9 @@ class TestMoves:
         one, two = in_session(api, "e-1", 1.0, "p-17"), in_session(api, "e-2", 2.0, "p-17b")
         source, target = athlete_of(api, two), athlete_of(api, one)
         api.post(f"/v1/athletes/{source}/merge", json={"into": target})
-        assert athlete_of(api, in_session(api, "e-3", 3.0, "p-17b")) == target
+        later = api.create("e-3", 3.0, athlete={"external_id": "p-17b"})
+        assert later["athlete"] == {"id": target, "external_id": "p-17"}
+        assert later == api.get(f"/v1/impacts/{later['id']}").json()
         again = api.post(
             "/v1/impacts",
             json=impact_body("e-2", 2.0, athlete={"external_id": "p-17b"}, context={"session_id": "s-1"}),
