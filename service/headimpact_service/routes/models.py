@@ -99,13 +99,19 @@ class AliasView(AliasChangeView):
     history: list[AliasChangeView] = Field(description="Oldest first; what it means now is the last.")
 
 
+def _said(reason: str) -> str:
+    if not reason.strip():
+        raise ValueError("A reason says something.")
+    return reason.strip()
+
+
 class AliasBody(Strict):
     """What an alias is to mean, and why."""
 
     version: Version | None = Field(
         description="A version that `GET /v1/models` lists; null lets `candidate` mean none."
     )
-    reason: Annotated[Text, AfterValidator(str.strip)] = Field(
+    reason: Annotated[Text, AfterValidator(_said)] = Field(
         description="For whoever asks later.", examples=["Gates passed; reviewed by the data team."]
     )
 

@@ -6,7 +6,7 @@ import re
 from datetime import datetime
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field, ValidationInfo, field_validator
 from starlette.responses import Response
 
 from headimpact_service import deps
@@ -38,10 +38,21 @@ class ScheduleBody(Strict):
     time_zone: Zone = Field(default="UTC", description="IANA zone of its clock.")
     enabled: bool = True
     fit: FitBody = Field(default_factory=FitBody)
-    gates: GatesBody = Field(default_factory=GatesBody)
+    gates: GatesBody = Field(default_factory=GatesBody, validate_default=True)
     promote: bool = Field(
         default=False, description="Whether a model that passes every gate becomes active without anybody's word."
     )
+
+    @field_validator("gates")
+    @classmethod
+    def _judge_what_is_fitted(cls, gates: GatesBody, info: ValidationInfo) -> GatesBody:
+        """The gates' criteria are fitted; where the sender names none and BAM is not, they are all that is fitted."""
+        fit: FitBody | None = info.data.get("fit")
+        if fit is None or fit.criteria is None or set(gates.criteria) <= set(fit.criteria):
+            return gates
+        if "criteria" in gates.model_fields_set:
+            raise ValueError(f"Gates judge criteria that are fitted, which are {', '.join(fit.criteria)}.")
+        return gates.model_copy(update={"criteria": list(fit.criteria)})
 
 
 class ScheduleView(BaseModel):

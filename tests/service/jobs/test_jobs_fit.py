@@ -253,6 +253,8 @@ class TestService:
         assert api.put(address, json=body).status_code == 428
         assert self.promote(api, "nobody", 0).status_code == 404
         assert api.put(address, json={"version": "laksari-2020"}, headers={"if-match": "*"}).status_code == 422
+        blank = api.put(address, json=body | {"reason": "  "}, headers={"if-match": "*"})
+        assert (blank.status_code, blank.json()["errors"][0]["pointer"]) == (422, "/reason")
         nothing = api.put(address, json={"version": None, "reason": "x"}, headers={"if-match": "*"})
         assert nothing.status_code == 409
         assert api.get("/v1/models/aliases/nonsense").status_code == 404
@@ -368,12 +370,19 @@ class TestSchedules:
             ({"time_zone": "Mars/Olympus"}, "/time_zone"),
             ({"gates": {"min_events": 0}}, "/gates/min_events"),
             ({"fit": {"version": "x"}}, "/fit/version"),
+            ({"fit": {"criteria": ["bam"]}, "gates": {"criteria": ["hic15"]}}, "/gates"),
         ],
     )
     def test_a_schedule_that_cannot_be_is_refused(self, api: Api, fields: dict[str, Any], pointer: str) -> None:
         answer = api.put("/v1/schedules/weekly", json=WEEKLY | fields)
         assert answer.status_code == 422
         assert answer.json()["errors"][0]["pointer"] == pointer
+
+    def test_gates_that_name_no_criterion_judge_what_is_fitted(self, api: Api) -> None:
+        for fitted, judged in ((["hic15"], ["hic15"]), (["bam", "bric"], ["bam"]), (None, ["bam"])):
+            fit = {} if fitted is None else {"criteria": fitted}
+            answer = api.put("/v1/schedules/weekly", json=WEEKLY | {"fit": fit})
+            assert answer.json()["gates"]["criteria"] == judged
 
     def test_promotion_by_itself_needs_the_scope(self, api: Api, make_key: Callable[..., str]) -> None:
         key = make_key("models:fit")
