@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from headimpact.criteria import CRITERION_KEYS
 from headimpact_service.ingest.impact_json import CriterionKey, Fraction, Moment, Strict, Text, Word
@@ -36,19 +36,35 @@ def _known(name: str) -> str:
     return name
 
 
+def _distinct(names: list[str]) -> list[str]:
+    if len(set(names)) < len(names):
+        raise ValueError("Each criterion may be named once.")
+    return names
+
+
+def _rising(bounds: list[float]) -> list[float]:
+    if bounds[0] > bounds[1]:
+        raise ValueError("A range of incidences rises.")
+    return bounds
+
+
+Criteria = Annotated[
+    list[Annotated[Word, AfterValidator(_known)]], Field(min_length=1, max_length=40), AfterValidator(_distinct)
+]
+IncidenceRange = Annotated[list[Fraction], Field(min_length=2, max_length=2), AfterValidator(_rising)]
+
+
 class FitBody(Strict):
     """A fit: on whom, of what, and how."""
 
     cohort: CohortBody = Field(default_factory=CohortBody)
-    criteria: Annotated[list[Annotated[Word, AfterValidator(_known)]], Field(max_length=40)] | None = Field(
-        default=None, description="All thirteen unless given."
-    )
+    criteria: Criteria | None = Field(default=None, description="All thirteen unless given.")
     sampling: Literal["case_control", "full_follow_up"] = Field(
         default="case_control",
         description="`case_control` where impacts were chosen by their outcome: intercepts go to `incidence`.",
     )
     incidence: Fraction | None = Field(default=None, description="What GET /v1/settings shows unless given.")
-    incidence_range: Annotated[list[Fraction], Field(min_length=2, max_length=2)] | None = None
+    incidence_range: IncidenceRange | None = None
     bias_correction: Literal["king_zeng", "firth", "zelig", "none"] = "king_zeng"
     replicas: Annotated[int, Field(ge=0, le=MAX_REPLICAS)] = 1000
     folds: Annotated[int, Field(ge=2, le=100)] = 5
@@ -57,14 +73,6 @@ class FitBody(Strict):
         Field(default=[0.5, 0.9])
     )
     title: Text | None = None
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> FitBody:
-        if self.incidence_range is not None and self.incidence_range[0] > self.incidence_range[1]:
-            raise ValueError("A range of incidences rises.")
-        if self.criteria is not None and len(set(self.criteria)) < len(self.criteria):
-            raise ValueError("Each criterion may be named once.")
-        return self
 
 
 class GatesBody(Strict):

@@ -189,9 +189,10 @@ class TestFit:
         ("fields", "pointer"),
         [
             ({"criteria": ["nonsense"]}, "/criteria/0"),
-            ({"criteria": ["bam", "bam"]}, ""),
+            ({"criteria": ["bam", "bam"]}, "/criteria"),
+            ({"criteria": []}, "/criteria"),
             ({"incidence": 0}, "/incidence"),
-            ({"incidence_range": [0.5, 0.1]}, ""),
+            ({"incidence_range": [0.5, 0.1]}, "/incidence_range"),
             ({"replicas": 10001}, "/replicas"),
             ({"folds": 1}, "/folds"),
             ({"seed": -1}, "/seed"),
