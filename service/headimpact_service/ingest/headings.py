@@ -104,8 +104,8 @@ class Vocabulary:
             raise ValueError(f"The vocabulary gives the heading {heading} two meanings.")
 
     def understand(self, heading: str) -> Meaning | None:
-        """What a heading says, if it is made of known words."""
-        return self._meanings.get(compact(heading))
+        """What a heading says, if it is made of known words; one too long for a mapping says nothing."""
+        return self._meanings.get(compact(heading)) if len(heading) <= MAX_COMPACT else None
 
     def mapping(self, headings: Headings) -> mappings.Mapping:
         """The mapping that a table's headings, each with the unit beside it, amount to."""

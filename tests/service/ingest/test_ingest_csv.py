@@ -140,6 +140,12 @@ def test_decimal_commas_between_other_separators_are_read(delimiter: str, monkey
     np.testing.assert_array_equal(samples_of(one(text.replace(".", ","))), six_axis())
 
 
+def test_a_decimal_comma_beside_what_is_no_number_is_none():
+    lines = csv_text(delimiter=";").replace(".", ",").splitlines()
+    lines[4] += "\x1d"
+    assert codes(refused("\n".join(lines)))[0][1] == "missing-sample"
+
+
 def test_decimal_commas_in_quotes_are_read():
     lines = csv_text().splitlines()
     quoted = [",".join(f'"{cell}"' for cell in line.split(",")).replace(".", ",") for line in lines[1:]]
@@ -207,6 +213,13 @@ def test_a_file_that_cannot_be_read_says_why(text: str, said: str):
     problem = refused(text)
     assert problem.slug == "unreadable-file"
     assert said in problem.detail
+
+
+def test_a_heading_too_long_for_a_mapping_says_nothing():
+    long = GENERIC.replace("ax_g", "ax_g" + "é".upper() * 10 + "–" * 200)
+    assert codes(refused(csv_text(heading=long)))[0][1] == "layout-unknown"
+    longer = GENERIC.replace("ax_g", "ax_g" + "–" * 190)
+    np.testing.assert_array_equal(samples_of(one(csv_text(heading=longer))), six_axis())
 
 
 def test_a_single_impact_has_at_most_20000_samples():
