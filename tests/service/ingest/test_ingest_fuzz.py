@@ -34,6 +34,8 @@ FILES: dict[str, tuple[bytes, dict[str, Any]]] = {
     "mat, structs": (mat({"impact": STRUCT}, do_compression=True), {"preset": "stanford_mat"}),
     "xlsx": (xlsx({"Summary": [["a", "b"], [1.0, 2.0]], "event": SHEET}), {}),
     "csv": (csv_text(six_axis(24), before={"external_id": '"a"'}).encode(), {}),
+    "csv, decimal commas": (csv_text(six_axis(24), delimiter=";").replace(".", ",").encode(), {}),
+    "csv, utf-16": (csv_text(six_axis(24), delimiter="\t").encode("utf-16"), {}),
     "json": (encoded(body()), {}),
     "ndjson": (encoded(body()) + b"\n" + encoded(body(external_id="b")), {}),
     "dts": (dts(DTS_COLUMNS, samples=200, length=60).encode(), {}),
@@ -83,7 +85,15 @@ def swap(data: bytearray, rng: random.Random) -> None:
     data[start : start + 64] = other[source : source + 64]
 
 
-DAMAGES: tuple[Callable[[bytearray, random.Random], None], ...] = (cut, flip, overwrite, repeat, drop, swap)
+def punctuate(data: bytearray, rng: random.Random) -> None:
+    """What means something to a reader of text stands where it should not."""
+    place = rng.randrange(len(data))
+    data[place:place] = rng.choice(
+        (b",", b";", b"\t", b'"', b"\n", b".", b"\0", b"1,234", b"\x1d", b"\xff\xfe", b"-" * 300)
+    )
+
+
+DAMAGES: tuple[Callable[[bytearray, random.Random], None], ...] = (cut, flip, overwrite, repeat, drop, swap, punctuate)
 
 
 def damaged(data: bytes, seed: int) -> bytes:
