@@ -18,6 +18,7 @@ from headimpact.risk import PUBLISHED_MODELS, RiskModel
 from headimpact_service.answers import json_bytes
 from headimpact_service.cli.cohort_table import CohortTable, TableError, read_cohort
 from headimpact_service.reports.figures import criterion_name
+from headimpact_service.reports.findings import counted
 from headimpact_service.reports.page import refit_page
 
 REPORT, PAGE, MODEL = "report.json", "report.html", "model.json"
@@ -159,11 +160,12 @@ def _tell(held: CohortTable, document: Mapping[str, Any], written: Sequence[Path
     console = Console(highlight=False, soft_wrap=True)
     cohort = document["cohort"]
     console.print(
-        f"{cohort['n']} impacts of {cohort['athletes']} athletes, {cohort['events']} concussions; "
+        f"{counted(cohort['n'], 'impact')} of {counted(cohort['athletes'], 'athlete')}, "
+        f"{counted(cohort['events'], 'concussion')}; "
         f"{cohort['sampling'].replace('_', ' ')}, incidence {cohort['incidence']:.4g}"
     )
     for reason, count in held.excluded.items():
-        console.print(f"{count} rows stay out: {reason.replace('_', ' ')}")
+        console.print(f"{counted(count, 'row')} left out: {reason.replace('_', ' ')}")
     if held.ignored:
         console.print(f"Columns that nothing is made of: {', '.join(held.ignored)}", markup=False)
     console.print(_summary(document))

@@ -13,6 +13,11 @@ FEW_EVENTS = events_for_expected_over_observed()
 """Events that E:O within 20 % needs (recalibrations with fewer are mostly noise)."""
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things, in words that agree with it."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One sentence; `kind` is good, note or warning."""
@@ -48,8 +53,8 @@ def _cohort(report: Mapping[str, Any]) -> Iterator[Finding]:
     if cohort["athletes_with_events"] < 10:
         yield Finding(
             "warning",
-            f"Only {cohort['athletes_with_events']} athletes had a concussion: what was learnt may be about them "
-            "rather than about heads in general.",
+            f"Only {counted(cohort['athletes_with_events'], 'athlete')} had a concussion: what was learnt may be about "
+            "them rather than about heads in general.",
         )
 
 

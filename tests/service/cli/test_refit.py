@@ -186,7 +186,7 @@ class TestTables:
             "not_worn": 1,
             "unverified": 1,
         }
-        assert "2 rows stay out: no outcome" in printed
+        assert "2 rows left out: no outcome" in printed
         run("refit", "--table", "t.csv", "--out", "out", "--replicas", "10", "--include", "unverified")
         assert json.loads((tmp_path / "out/report.json").read_text())["cohort"]["n"] == 115
 
