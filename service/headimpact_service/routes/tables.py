@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Literal, Protocol
 
+from headimpact_service import memory
 from headimpact_service.answers import CSV, NDJSON, PARQUET, json_bytes
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.formula_cells import guarded
@@ -187,6 +188,9 @@ def _library() -> tuple[Any, Any]:
         # Here, since a service that nobody asks for Parquet does without its tens of megabytes.
         import pyarrow as pa
         import pyarrow.parquet as pq
+
+        with memory.without_pandas():
+            pa.array([0.0])
     except ImportError:
         detail = "Parquet needs an extra that is not installed here: headimpact[files]."
         raise Problem("not-acceptable", detail) from None

@@ -236,3 +236,16 @@ def test_help_loads_neither_the_science_nor_the_database() -> None:
         "print([name for name in ('numpy', 'scipy', 'sqlalchemy', 'pydantic', 'starlette') if name in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_a_table_of_parquet_loads_no_pandas() -> None:
+    script = (
+        "import sys\n"
+        "from headimpact_service.routes.tables import ParquetForm\n"
+        "form = ParquetForm(['a', 'b'], {'a': 'number'}, lambda row: row)\n"
+        "made = form.encode([(1.0, 'x'), (None, None)]) + form.finish()\n"
+        "print(made[:4], 'pyarrow' in sys.modules, 'pandas' in sys.modules)\n"
+        "import pandas\n"  # which is there all the same for whoever asks for it
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["b'PAR1'", "True", "False"]

@@ -13,7 +13,6 @@ import socket
 import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module
-from importlib.abc import MetaPathFinder
 
 import numpy as np
 
@@ -36,21 +35,11 @@ IDLE_S = 60.0
 Reader = Callable[[io.BufferedIOBase], Iterator[Content]]
 
 
-class _WithoutPandas(MetaPathFinder):
-    """pyarrow loads pandas wherever it is installed, as statsmodels has it: 50 MiB that no file needs here."""
-
-    def find_spec(self, fullname: str, path: object, target: object = None) -> None:  # noqa: ARG002 - its shape
-        """There is no pandas; everything else is somebody else's to find."""
-        if fullname == "pandas":
-            raise ModuleNotFoundError(fullname, name=fullname)
-
-
 def main() -> None:
     """Serve one connection."""
     memory.give_back()
-    sys.meta_path.insert(0, _WithoutPandas())
     kind, descriptor = sys.argv[1], int(sys.argv[2])
-    with socket.socket(fileno=descriptor) as connection:
+    with memory.without_pandas(), socket.socket(fileno=descriptor) as connection:
         try:
             serve(connection, kind)
         except WireError:
