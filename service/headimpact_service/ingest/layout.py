@@ -132,6 +132,7 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: bo
         if components[axis] is None:
             raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)
+    _require_distinct(name, (x, y, z))
     first = min(component.column for component in (x, y, z) if component.column is not None)
     return SignalLayout(
         unit=_unit(name, columns),
@@ -141,6 +142,18 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: bo
         sample_rate_hz=columns.sample_rate_hz,
         full_scale=columns.range,
     )
+
+
+def _require_distinct(name: SignalName, components: Sequence[Component]) -> None:
+    """Refuse a column that is said to be two components of one signal."""
+    columns = [component.column for component in components if component.column is not None]
+    for axis, component in zip(AXES, components, strict=True):
+        if component.column is not None and columns.count(component.column) > 1:
+            raise layout_problem(
+                f"One column is said to be several components of the {name}.",
+                code="column-twice",
+                pointer=f"/{name}/{axis}",
+            )
 
 
 def _own_clock(

@@ -374,6 +374,12 @@ def test_every_preset_is_listed_with_its_columns_units_and_axes():
     assert listed["swa"]["requires"] == ["sample_rate_hz", "occurred_at"]
 
 
+def test_a_column_is_one_component_of_a_signal():
+    columns = {"linear_acceleration": {"unit": "g", "x": "ax_g", "y": "-ax_g", "z": "az_g"}}
+    problem = refused(table("t_s,ax_g,az_g"), mapping=mapping(columns | {"time": {"column": "t_s", "unit": "s"}}))
+    assert codes(problem) == [("/linear_acceleration/x", "column-twice")]
+
+
 def test_an_imperial_file_may_name_its_units_behind_its_headings():
     units = {"LinAcc": " (m/s^2)", "RotVel": " [deg/s]", "RotAcc": "_rad_s2"}
     headings = [
