@@ -44,7 +44,7 @@ def _distinct(names: list[str]) -> list[str]:
 
 def _rising(bounds: list[float]) -> list[float]:
     if bounds[0] > bounds[1]:
-        raise ValueError("A range of incidences rises.")
+        raise ValueError("A range rises: its first number is not above its second.")
     return bounds
 
 
@@ -75,6 +75,17 @@ class FitBody(Strict):
     title: Text | None = None
 
 
+def _coefficient(name: str) -> str:
+    """One of a criterion's coefficients, or all of them."""
+    return _known(name.partition(".")[0]) and name
+
+
+Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_rising)]
+PositiveRange = Annotated[
+    list[Annotated[float, Field(gt=0)]], Field(min_length=2, max_length=2), AfterValidator(_rising)
+]
+
+
 class GatesBody(Strict):
     """What a model must pass before it is promoted by itself; what is left out keeps its default."""
 
@@ -85,14 +96,12 @@ class GatesBody(Strict):
     max_auc_loss: Annotated[float, Field(ge=0, le=1)] = Field(
         default=0.02, description="Out of fold against the active model, by the lower end of a bootstrap of athletes."
     )
-    expected_over_observed: Annotated[list[Annotated[float, Field(gt=0)]], Field(min_length=2, max_length=2)] = Field(
+    expected_over_observed: PositiveRange = Field(
         default=[0.8, 1.25],
         description="What the 95 % interval of E:O must meet, out of fold and weighted to the incidence.",
     )
-    calibration_slope: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
-        default=[0.8, 1.2], description="Out of fold."
-    )
-    waive_lowering: Annotated[list[Word], Field(max_length=39)] = Field(
+    calibration_slope: Range = Field(default=[0.8, 1.2], description="Out of fold.")
+    waive_lowering: Annotated[list[Annotated[Word, AfterValidator(_coefficient)]], Field(max_length=39)] = Field(
         default=[],
         description="Coefficients that may lower the risk: `bam.y`, or `bam` for all of its.",
         examples=[["bam.y"]],

@@ -23,7 +23,7 @@ def if_match(request: Request, *, required: bool = False) -> int | None:
     text = request.headers.get("if-match")
     if text is None:
         if required:
-            raise Problem("precondition-required", "A correction needs If-Match with the ETag of the present revision.")
+            raise Problem("precondition-required", "This change needs If-Match with the ETag of the present revision.")
         return None
     text = text.strip()
     if text == "*":

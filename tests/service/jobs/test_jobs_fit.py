@@ -372,6 +372,9 @@ class TestSchedules:
             ({"gates": {"min_events": 0}}, "/gates/min_events"),
             ({"fit": {"version": "x"}}, "/fit/version"),
             ({"fit": {"criteria": ["bam"]}, "gates": {"criteria": ["hic15"]}}, "/gates"),
+            ({"gates": {"calibration_slope": [2, 1]}}, "/gates/calibration_slope"),
+            ({"gates": {"expected_over_observed": [1.25, 0.8]}}, "/gates/expected_over_observed"),
+            ({"gates": {"waive_lowering": ["foo.q"]}}, "/gates/waive_lowering/0"),
         ],
     )
     def test_a_schedule_that_cannot_be_is_refused(self, api: Api, fields: dict[str, Any], pointer: str) -> None:
