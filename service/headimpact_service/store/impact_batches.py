@@ -103,6 +103,8 @@ def _in_parts(values: Iterable[T]) -> Iterator[list[T]]:
 
 def _insert_new(conn: Connection, data_set_id: bytes, news: Sequence[NewImpact]) -> Iterator[Added]:
     """Write impacts of which nothing is known."""
+    if not news:
+        return iter(())
     athlete_ids = _ids(conn, data_set_id, _ATHLETES, (new.athlete_external_id for new in news), athlete_store.ensure)
     device_ids = _ids(conn, data_set_id, _DEVICES, (new.device_serial for new in news), device_store.ensure)
     first = next_change(conn, impacts, data_set_id)
@@ -110,8 +112,7 @@ def _insert_new(conn: Connection, data_set_id: bytes, news: Sequence[NewImpact])
     for number, new in enumerate(news):
         athlete_id, device_id = athlete_ids.get(new.athlete_external_id), device_ids.get(new.device_serial)
         rows.append((new, first_row(data_set_id, new, athlete_id, device_id, first + number * MICROSECOND)))
-    if rows:
-        insert_rows(conn, rows)
+    insert_rows(conn, rows)
     return iter([Added("created", row["id"], new.external_id) for new, row in rows])
 
 

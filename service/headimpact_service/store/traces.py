@@ -68,7 +68,7 @@ def _stored(values: FloatArray) -> _Stored:
     if digits is not None:
         whole = np.rint(rows * 10.0**digits).astype(np.int32)
         if _same_bits(whole / 10.0**digits, rows):  # neither -0.0 nor a multiple beyond int32 comes back
-            return _Stored(DECIMAL + digits, _plane(_differences(whole)))
+            return _Stored(DECIMAL + digits, _plane(_differences(whole.reshape(-1))))
     single = rows.astype(np.float32)
     if _same_bits(single.astype(np.float64), rows):
         return _Stored(SINGLE, _plane(single.reshape(-1)))
@@ -88,14 +88,6 @@ def _digits(rows: FloatArray) -> int | None:
 
 def _same_bits(found: FloatArray, values: FloatArray) -> bool:
     return found.tobytes() == values.tobytes()
-
-
-def _differences(whole: NDArray[np.int32]) -> NDArray[np.int32]:
-    """From sample to sample, the first as it is. Beyond the range of int32 they wrap, there and back."""
-    flat = whole.reshape(-1)
-    steps = flat.copy()
-    steps[1:] -= flat[:-1]
-    return steps
 
 
 def encode_many(items: Sequence[Mapping[str, FloatArray]]) -> list[bytes]:
@@ -137,7 +129,7 @@ def _in_forms(rows: FloatArray) -> list[_Stored]:
             values = rows[of_form]
             whole = np.rint(values * 10.0**form).astype(np.int32)
             same = _same_rows(whole / 10.0**form, values)  # neither -0.0 nor a multiple beyond int32 comes back
-            found.update(_planes(of_form[same], DECIMAL + form, _differences_many(whole[same])))
+            found.update(_planes(of_form[same], DECIMAL + form, _differences(whole[same])))
     rest = np.array([row for row in range(len(rows)) if row not in found], dtype=np.intp)
     if rest.size:
         values = rows[rest]
@@ -162,10 +154,10 @@ def _same_rows(found: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
     return same
 
 
-def _differences_many(whole: NDArray[np.int32]) -> NDArray[np.int32]:
-    """From sample to sample, the first as it is. Beyond the range of int32 they wrap, there and back."""
+def _differences(whole: NDArray[np.int32]) -> NDArray[np.int32]:
+    """From sample to sample of each row, the first as it is. Beyond the range of int32 they wrap, there and back."""
     steps = whole.copy()
-    steps[:, 1:] -= whole[:, :-1]
+    steps[..., 1:] -= whole[..., :-1]
     return steps
 
 
