@@ -38,6 +38,7 @@ from headimpact_service.routes import (
     settings,
 )
 from headimpact_service.routes.facts import Facts
+from headimpact_service.routes.scorer import Scorer
 from headimpact_service.settings import Settings
 from headimpact_service.store.database import Database
 
@@ -76,6 +77,7 @@ def create_app(configured: Settings, database: Database, engine: deps.JobEngine 
     app.router.redirect_slashes = False  # /v1/impacts/ is another path, and nothing is there
     deps.set_up(app, configured, database, engine)
     app.state.facts = Facts()
+    app.state.scorer = Scorer()
     app.state.openapi = _document()
     return app
 

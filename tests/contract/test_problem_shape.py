@@ -234,7 +234,7 @@ class TestFaultsOfOurOwn:
         def fail(*_: object) -> None:
             raise RuntimeError(SECRET)
 
-        monkeypatch.setattr("headimpact_service.routes.scoring.score_record", fail)
+        monkeypatch.setattr("headimpact_service.routes.scorer.score_record", fail)
         with caplog.at_level(logging.ERROR):
             answer = api.post("/v1/score", json={"kinematics": kinematics()}, headers={"X-Request-Id": "req-7"})
         assert_problem(answer, "internal-error")

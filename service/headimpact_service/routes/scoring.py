@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
-from anyio.to_thread import run_sync
 from starlette.responses import Response
 
 from headimpact_service import examples
@@ -14,14 +11,11 @@ from headimpact_service.ingest.impact_reading import to_record
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.facts import with_population_note
 from headimpact_service.intake.rendering import new_score, score_document, scored_traces
-from headimpact_service.intake.scoring import UNKNOWN_DEVICE, DeviceFacts, Scored, Terms, score_record
+from headimpact_service.intake.scoring import UNKNOWN_DEVICE, DeviceFacts, Scored
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.routes.score_shapes import ScoreView
 
 routes = Routes("scores")
-
-MANY_SAMPLES = 4000
-"""From here on scoring leaves the event loop: it would hold up every other request for milliseconds."""
 
 RECORD_PROBLEMS = ("invalid-trace", "improper-rotation", "mounting-missing", "operating-point-unreachable")
 
@@ -49,7 +43,8 @@ async def score_impact(call: Call) -> Response:
 async def score(call: Call, record: ImpactRecord) -> Scored:
     """The record scored under the terms of the caller's organisation."""
     device, record = await facts_of(call, record)
-    return await score_beside(record, call.terms, device)
+    scored: Scored = await call.request.app.state.scorer.score(record, call.terms, device)
+    return scored
 
 
 async def facts_of(call: Call, record: ImpactRecord) -> tuple[DeviceFacts, ImpactRecord]:
@@ -58,10 +53,3 @@ async def facts_of(call: Call, record: ImpactRecord) -> tuple[DeviceFacts, Impac
         return UNKNOWN_DEVICE, with_population_note(record, None)
     found: tuple[DeviceFacts, ImpactRecord] = await call.request.app.state.facts.of(call, record)
     return found
-
-
-async def score_beside(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored:
-    """Score here if that is quick, else in a thread beside the event loop."""
-    if max((signal.values.shape[0] for _, signal in record.recording.signals()), default=0) < MANY_SAMPLES:
-        return score_record(record, terms, device)
-    return await run_sync(partial(score_record, record, terms, device))
