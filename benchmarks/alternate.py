@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
 from collections.abc import Callable
@@ -38,10 +39,17 @@ def cpu_seconds(work: Callable[[], object], calls: int) -> float:
     return (time.process_time() - start) / calls
 
 
+def _require_one_thread() -> None:
+    """OpenBLAS's threads spin for a while after each call that used them, and whoever runs next would pay for it."""
+    if os.environ.get("OPENBLAS_NUM_THREADS") != "1":
+        raise SystemExit("Set OPENBLAS_NUM_THREADS=1: process CPU time counts threads that wait for work.")
+
+
 def compare(
     ours: Callable[[], object], peer: Callable[[], object], *, calls: tuple[int, int], rounds: int = 15
 ) -> Comparison:
     """Time `ours` and `peer` in turn after one warm-up of each; ratios are peer over ours: above 1, ours is cheaper."""
+    _require_one_thread()
     cpu_seconds(ours, calls[0])
     cpu_seconds(peer, calls[1])
     pairs = [(cpu_seconds(ours, calls[0]), cpu_seconds(peer, calls[1])) for _ in range(rounds)]

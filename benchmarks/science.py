@@ -1,6 +1,6 @@
 """The science against its peers, side by side in one run.
 
-    uv run --with eqsig==1.2.17 --with dynars==1.1.0 python benchmarks/science.py
+    OPENBLAS_NUM_THREADS=1 uv run --with eqsig==1.2.17 --with dynars==1.1.0 python benchmarks/science.py
 
 Ratios are the peer's process CPU time over ours, the median over rounds in turn, with the lowest and highest.
 """
