@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
 from anyio.to_thread import run_sync
 
-from headimpact_service.errors import Problem
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.scoring import DeviceFacts, Scored, Terms, score_record, score_records
 
@@ -71,17 +71,21 @@ class Scorer:
 
 def _score(together: Sequence[_Waiting]) -> None:
     """Answer those who wait for a score under the same terms."""
+    for one, result in zip(together, _results(together), strict=True):
+        if one.waiter.done():  # its request is gone
+            continue
+        if isinstance(result, Exception):
+            one.waiter.set_exception(result)
+        else:
+            one.waiter.set_result(result)
+
+
+def _results(together: Sequence[_Waiting]) -> Sequence[Scored | Exception]:
+    """The score of each, or what its request is to raise."""
     if len(together) > 1:
-        try:
-            found = score_records([(one.record, one.device) for one in together], together[0].terms)
-        except Exception:
-            found = []
-        for one, result in zip(together, found, strict=False):
-            _answer(one, result)
-        if found:
-            return
-    for one in together:
-        _answer(one, _alone(one))
+        with suppress(Exception):  # a fault of our own: whose record meets it shows when each is scored alone
+            return score_records([(one.record, one.device) for one in together], together[0].terms)
+    return [_alone(one) for one in together]
 
 
 def _alone(one: _Waiting) -> Scored | Exception:
@@ -89,12 +93,3 @@ def _alone(one: _Waiting) -> Scored | Exception:
         return score_record(one.record, one.terms, one.device)
     except Exception as error:
         return error
-
-
-def _answer(one: _Waiting, result: Scored | Problem | Exception) -> None:
-    if one.waiter.done():  # its request is gone
-        return
-    if isinstance(result, Exception):
-        one.waiter.set_exception(result)
-    else:
-        one.waiter.set_result(result)
