@@ -95,7 +95,7 @@ def _document() -> bytes:
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    app.state.engine.start()
+    await run_sync(app.state.engine.start)
     yield
     await run_sync(app.state.engine.stop)
     app.state.database.close()  # what is queued is written first: its senders were promised an answer

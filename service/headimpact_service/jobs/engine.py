@@ -63,10 +63,22 @@ class Engine:
         self._transact: Transact | None = None
         self._seen_free: dict[str, float] = {}
         self._next_night = datetime.now(UTC)
-        self._thread = threading.Thread(target=self._work, name="headimpact-jobs", daemon=True)
+        self._left_over: set[str] = set()
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Begin, beside the caller."""
+        """Take a place among the processes that work, then begin, beside the caller.
+
+        A process that serves must not take uploads before: what others find in the folder while they are alone is
+        nobody's, unless a job has it.
+        """
+        try:
+            slot = slot_of(self._house.database, self._folder)
+        except (OSError, SQLAlchemyError, SlotsTakenError):
+            logger.exception("No jobs run in this process: it could not take a place among those that work.")
+            return
+        self._left_over = self._house.uploads.names()
+        self._thread = threading.Thread(target=self._work, args=(slot,), name="headimpact-jobs", daemon=True)
         self._thread.start()
 
     def wake(self) -> None:
@@ -77,19 +89,16 @@ class Engine:
         """Hand back what is under way and end; blocks until that is done."""
         self._house.stopping.set()
         self._woken.set()
-        if self._thread.is_alive():
+        if self._thread is not None:
             self._thread.join()
 
-    def _work(self) -> None:
-        try:
-            with slot_of(self._house.database, self._folder) as slot:
-                while not self._house.stopping.is_set():
-                    self._woken.clear()
-                    self._round(slot)
-                    self._woken.wait(TICK_S)
-                self._close()
-        except (OSError, SQLAlchemyError, SlotsTakenError):
-            logger.exception("No jobs run in this process: it could not take a place among those that work.")
+    def _work(self, slot: Slot) -> None:
+        with slot:
+            while not self._house.stopping.is_set():
+                self._woken.clear()
+                self._round(slot)
+                self._woken.wait(TICK_S)
+            self._close()
 
     def _round(self, slot: Slot) -> None:
         try:
@@ -175,10 +184,18 @@ class Engine:
         self._clean_uploads(slot)
 
     def _clean_uploads(self, slot: Slot) -> None:
-        first = self._transact is None and slot.is_alone()
+        """Delete files of no job: what lay there when this process began, if it is alone, and what is very old.
+
+        The jobs are read after the files: one that arrives meanwhile has its job by then or is not among them.
+        """
+        found = self._house.uploads.names(older_than_s=OTHERS_AGE_S)
+        if slot.is_alone():
+            found |= self._left_over
         with self._house.database.read() as conn:
-            names = {ids.encode("job", job.id) for job in job_runs.unfinished(conn)}
-        self._house.uploads.remove_orphans(names, 0.0 if first else OTHERS_AGE_S)
+            found -= {ids.encode("job", job.id) for job in job_runs.unfinished(conn)}
+        for name in found:
+            self._house.uploads.remove(name)
+        self._left_over = set()
 
     def _close(self) -> None:
         """Wait for the runs to hand their jobs back, then close."""

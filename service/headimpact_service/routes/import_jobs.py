@@ -56,12 +56,15 @@ async def _submit(call: Call, upload: Upload, new: NewJob) -> Job:
     """The file first: a job whose file is not there could not be done; a file without a job is only in the way."""
     name = ids.encode("job", new.id)
     await run_sync(upload.file.keep, name)
-    made = None
     try:
         made = await deps.submit(call.request, call.data_set_id, new)
-    finally:
-        if made is None or made.id != new.id:
+    except Exception:
+        # A commit whose answer was lost may have ordered it; who is cut off here leaves the file to the clean-up.
+        if not await deps.read(call.request, lambda conn: jobs.get(conn, call.data_set_id, new.id)):
             call.request.app.state.uploads.remove(name)
+        raise
+    if made.id != new.id:
+        call.request.app.state.uploads.remove(name)
     return made
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Collection
 from contextlib import suppress
 from hashlib import sha256
 from io import BytesIO
@@ -46,15 +45,12 @@ class Uploads:
         """Delete a kept file, if it is there."""
         self.path(name).unlink(missing_ok=True)
 
-    def remove_orphans(self, names: Collection[str], older_than_s: float) -> int:
-        """Delete what none of `names` is and nobody has written to for a while; how many they were."""
+    def names(self, older_than_s: float = 0.0) -> set[str]:
+        """What is in the folder, received in part or kept, and was not written to for a while."""
         if not self.folder.is_dir():
-            return 0
+            return set()
         limit = time.time() - older_than_s
-        orphans = [path for path in self.folder.iterdir() if path.name not in names and _written(path) <= limit]
-        for path in orphans:
-            path.unlink(missing_ok=True)
-        return len(orphans)
+        return {path.name for path in self.folder.iterdir() if not older_than_s or _written(path) <= limit}
 
 
 class Incoming:

@@ -11,11 +11,15 @@ import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
 from sending import Api, impact_body, zipped
+from starlette.requests import Request
 
+from headimpact_service import deps
 from headimpact_service.app import create_app
 from headimpact_service.settings import Settings
-from headimpact_service.store import ids, job_runs
+from headimpact_service.store import ids, job_runs, jobs
 from headimpact_service.store.database import Database
+from headimpact_service.store.jobs import Job, NewJob
+from headimpact_service.store.unavailable import unavailable
 
 ASYNC = {"Prefer": "respond-async"}
 NDJSON = {"Content-Type": "application/x-ndjson"}
@@ -75,6 +79,20 @@ class TestOrder:
 
     def test_a_dry_run_is_answered_at_once_though_a_job_is_preferred(self, api: Api) -> None:
         assert order(api, params={"dry_run": "true"}).status_code == 207
+
+    @pytest.mark.parametrize("ordered", [True, False], ids=["after the commit", "before it"])
+    def test_when_the_database_fails_the_file_of_a_job_that_is_there_is_kept(
+        self, api: Api, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, ordered: bool
+    ) -> None:
+        async def fails(request: Request, data_set_id: bytes, new: NewJob) -> Job:
+            if ordered:
+                await deps.write(request, lambda conn: jobs.submit(conn, data_set_id, new))
+            raise unavailable("The database did not answer.")
+
+        monkeypatch.setattr(deps, "submit", fails)
+        assert order(api).status_code == 503
+        made = [job["id"] for job in api.get("/v1/jobs").json()["data"]]
+        assert (len(made), uploads(tmp_path)) == (int(ordered), made)
 
 
 class TestIdempotency:

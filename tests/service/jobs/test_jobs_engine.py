@@ -10,12 +10,14 @@ from typing import Any
 
 import pytest
 from job_kinds import Counting, now
+from sqlalchemy import Connection
 
 from headimpact_service.jobs import engine as engine_module
 from headimpact_service.jobs.engine import Engine, next_night
 from headimpact_service.jobs.runs import House
-from headimpact_service.store import job_runs, jobs
+from headimpact_service.store import ids, job_runs, jobs
 from headimpact_service.store.jobs import Job, NewJob
+from headimpact_service.store.slot import SlotsTakenError
 from headimpact_service.store.tables import jobs as job_table
 
 Start = Callable[[], Engine]
@@ -136,6 +138,46 @@ def test_jobs_that_ended_long_ago_are_deleted_at_the_start(
                 return
         waiting.wait(0.05)
     raise AssertionError("the job is still there")
+
+
+def upload(house: House, name: str) -> None:
+    with house.uploads.receive(0) as incoming:
+        incoming.write(b"x")
+        incoming.keep(name)
+
+
+def test_what_no_job_has_is_deleted_at_the_start_and_what_arrives_then_is_not(
+    start: Start, kind: Counting, house: House, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    upload(house, "job_of_nobody")
+    upload(house, ids.encode("job", job.id))
+    real = job_runs.unfinished
+    before: list[set[str]] = []
+
+    def one_arrives(conn: Connection) -> list[Job]:
+        """An upload whose job is ordered just after the engine has looked at the jobs."""
+        found = real(conn)
+        if not before:
+            upload(house, "job_that_arrives")
+        before.append(house.uploads.names())
+        return found
+
+    monkeypatch.setattr(job_runs, "unfinished", one_arrives)
+    start()
+    ended(house, job)
+    assert "job_of_nobody" in before[0]
+    assert house.uploads.names() == {"job_that_arrives", ids.encode("job", job.id)}
+
+
+def test_without_a_place_no_job_runs_and_a_stop_is_quiet(
+    start: Start, kind: Counting, house: House, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def taken(*_: Any) -> None:
+        raise SlotsTakenError("all taken")
+
+    monkeypatch.setattr(engine_module, "slot_of", taken)
+    start().stop()
+    assert now(house, job).state == "queued"
 
 
 @pytest.mark.parametrize(

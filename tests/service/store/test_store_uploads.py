@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from hashlib import sha256
 from pathlib import Path
 
@@ -42,13 +43,15 @@ def test_a_file_that_is_not_kept_leaves_nothing(uploads: Uploads) -> None:
     assert list(uploads.folder.iterdir()) == []
 
 
-def test_orphans_are_deleted_and_files_of_jobs_are_not(uploads: Uploads) -> None:
+def test_what_lies_there_is_named_and_told_by_its_age(uploads: Uploads) -> None:
+    assert uploads.names() == set()
     for name in ("job_1", "job_2"):
         with uploads.receive(0) as incoming:
             incoming.write(b"x")
             incoming.keep(name)
-    assert uploads.remove_orphans({"job_1"}, older_than_s=3600) == 0
-    assert uploads.remove_orphans({"job_1"}, older_than_s=0) == 1
-    assert [path.name for path in uploads.folder.iterdir()] == ["job_1"]
+    os.utime(uploads.path("job_2"), (0, 0))
+    assert uploads.names() == {"job_1", "job_2"}
+    assert uploads.names(older_than_s=3600) == {"job_2"}
     uploads.remove("job_1")
     uploads.remove("job_1")
+    assert uploads.names() == {"job_2"}
