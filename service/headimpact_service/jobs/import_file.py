@@ -8,7 +8,7 @@ from typing import Any
 
 from headimpact_service.errors import Problem
 from headimpact_service.intake.importing import COUNTED, store, summary
-from headimpact_service.jobs.import_compute import Chunk
+from headimpact_service.jobs.import_score import Chunk
 from headimpact_service.jobs.runs import House, Outcome, Result, Work
 from headimpact_service.store import ids
 from headimpact_service.store.jobs import Job

@@ -92,7 +92,7 @@ def _pragmas(access: Access, busy_timeout_s: float) -> list[str]:
         f"PRAGMA foreign_keys = {'OFF' if access is Access.MIGRATE else 'ON'}",
         f"PRAGMA busy_timeout = {round(busy_timeout_s * 1000)}",  # wait for another process, do not fail at once
         "PRAGMA secure_delete = ON",  # an erased athlete's bytes are overwritten, not only unlinked
-        "PRAGMA cache_size = -65536",  # 64 MiB: the leaves of the indices stay at hand
+        "PRAGMA cache_size = -16384",  # 16 MiB: leaves of the indices stay at hand; traces would fill any size
         "PRAGMA wal_autocheckpoint = 4000",  # 16 MiB: a page that many commits touch is moved once
         "PRAGMA temp_store = MEMORY",  # sorting writes no file beside a read-only root
         f"PRAGMA query_only = {'ON' if access is Access.READ else 'OFF'}",  # a reader cannot write by mistake

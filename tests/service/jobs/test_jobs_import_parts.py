@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from headimpact_service.intake import parts as bounds
 from headimpact_service.intake.parts import MAX_VALUES, parts
-from headimpact_service.jobs.import_compute import Chunk, compute
+from headimpact_service.jobs.import_compute import compute
+from headimpact_service.jobs.import_score import Chunk
 from headimpact_service.store.database import Database
 from headimpact_service.store.impacts import NewImpact
 
@@ -28,7 +29,7 @@ def test_parts_hold_everything_in_order_within_their_bounds(sizes: list[int], mo
 def test_no_part_is_smaller_than_it_must_be() -> None:
     short = [600] * 450
     assert [len(part) for part in parts(short, lambda size: size, 200)] == [200, 200, 50]
-    assert [len(part) for part in parts([120_000] * 7, lambda size: size, 200)] == [2, 2, 2, 1]
+    assert [len(part) for part in parts([60_000] * 7, lambda size: size, 200)] == [2, 2, 2, 1]
 
 
 def long_records(path: Path, count: int, samples: int) -> None:
