@@ -22,6 +22,7 @@ from headimpact.kinematics import (
     empty_stack,
     rotated,
     running_integral,
+    squared_norm,
     transfer_to_head_cg,
 )
 from headimpact.plan import Group, Plan, channels_of, plan_of
@@ -30,12 +31,13 @@ from headimpact.quality import (
     QualityNote,
     check_angular_acceleration,
     check_channels,
+    check_cut_off,
     check_identical,
     words,
 )
 from headimpact.record_rules import derived_out_of_range, require_samples
 from headimpact.recording import FloatArray, Recording, SignalName
-from headimpact.time_base import brought
+from headimpact.time_base import brought, kept_of
 from headimpact.uniform import Layout, Uniform, uniform
 
 # Impacts that are worked on at once: enough to spread NumPy's cost per call, few enough to stay in the processor's
@@ -203,6 +205,7 @@ def _motion(plan: Plan, samples: Sequence[FloatArray], noted: list[list[QualityN
     for name, values in tracks.items():
         _to_head_axes(plan, name, values, noted)
     if not in_place:
+        _look_outside(plan, tracks, noted)
         for row, name in enumerate(signals):
             stack[:, row] = brought(tracks[name], plan.base.ways[name])
     if plan.offset_m is not None:
@@ -259,6 +262,19 @@ def _to_head_axes(plan: Plan, name: SignalName, values: FloatArray, noted: list[
                 "zero."
             )
             notes.append(QualityNote("out_of_plane_removed", "note", detail, name))
+
+
+def _look_outside(plan: Plan, tracks: Tracks, noted: list[list[QualityNote]]) -> None:
+    """Note the signals as sent whose largest sample is in none that are kept."""
+    for signal in plan.layout.signals:
+        kept = kept_of(plan.base.ways[signal.name])
+        size = squared_norm(tracks[signal.name])
+        if kept.start == 0 and kept.stop >= size.shape[0]:
+            continue
+        within = np.sqrt(size[kept].max(axis=0))
+        beyond = np.sqrt(np.delete(size, kept, axis=0).max(axis=0))
+        for place, notes in enumerate(noted):
+            notes += check_cut_off(signal.name, float(within[place]), float(beyond[place]))
 
 
 def _derived_out_of_range(motion: Motion) -> dict[int, TraceError]:

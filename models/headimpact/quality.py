@@ -31,6 +31,7 @@ CODES: tuple[str, ...] = (
     "constant_channel",
     "identical_channels",
     "record_truncated",
+    "peak_cut_off",
     "angular_acceleration_mismatch",
     "vendor_peak_mismatch",
     "angular_velocity_integrated",
@@ -192,6 +193,16 @@ def check_rate(signal: str, sample_rate_hz: float) -> Iterator[QualityNote]:
             f"The {words(signal)} was sampled at {sample_rate_hz:.4g} Hz; peaks are under-read below {bound:g} Hz.",
             signal,
         )
+
+
+def check_cut_off(signal: str, kept: float, cut_off: float) -> Iterator[QualityNote]:
+    """The largest resultant of a signal within the time that all signals share, against that outside of it."""
+    if cut_off > kept:
+        detail = (
+            f"The {words(signal)} is larger where not all signals were recorded, {cut_off:.4g}, than in the time that "
+            f"they share, {kept:.4g}; only that was scored."
+        )
+        yield QualityNote("peak_cut_off", "warning", detail, signal)
 
 
 def check_angular_acceleration(supplied: FloatArray, derived: FloatArray) -> Iterator[QualityNote]:

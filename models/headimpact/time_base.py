@@ -33,17 +33,16 @@ class Onto:
 
 @dataclass(frozen=True, slots=True)
 class TimeBase:
-    """The samples that signals are brought to, and for each signal how: a slice of its own, or between them."""
+    """The samples that signals are brought to, and for each signal how: a slice of its own, or between them.
+
+    `keeps_all`: every signal is there already, sample for sample, and has no others.
+    """
 
     rate_hz: float
     start_s: float
     samples: int
     ways: Mapping[SignalName, slice | Onto]
-
-    @property
-    def keeps_all(self) -> bool:
-        """Whether every signal is there already, sample for sample."""
-        return all(way == slice(0, self.samples) for way in self.ways.values())
+    keeps_all: bool
 
 
 def common_time_base(tracks: Mapping[SignalName, Track]) -> TimeBase:
@@ -63,7 +62,9 @@ def common_time_base(tracks: Mapping[SignalName, Track]) -> TimeBase:
     if last - first + 1 < QUALITY_LIMITS["record"]["minimum_samples"]:
         raise TraceError("no-overlap", "The signals must overlap in time by at least 3 samples.")
     ways = {name: _way(track, base, first, last) for name, track in tracks.items()}
-    return TimeBase(base.rate_hz, base.start_s + first / base.rate_hz, last - first + 1, ways)
+    samples = last - first + 1
+    keeps_all = all(way == slice(0, track.samples) for way, track in zip(ways.values(), tracks.values(), strict=True))
+    return TimeBase(base.rate_hz, base.start_s + first / base.rate_hz, samples, ways, keeps_all)
 
 
 def _way(track: Track, base: Track, first: int, last: int) -> slice | Onto:
@@ -74,6 +75,11 @@ def _way(track: Track, base: Track, first: int, last: int) -> slice | Onto:
     position = np.clip((time_s - track.start_s) * track.rate_hz, 0.0, track.samples - 1)
     before = np.minimum(position.astype(np.intp), track.samples - 2)
     return Onto(before, position - before)
+
+
+def kept_of(way: slice | Onto) -> slice:
+    """Which samples of a signal those of the base come from."""
+    return way if isinstance(way, slice) else slice(int(way.before[0]), int(way.before[-1]) + 2)
 
 
 def brought(values: FloatArray, way: slice | Onto) -> FloatArray:

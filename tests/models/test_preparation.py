@@ -125,6 +125,37 @@ def test_signals_on_their_own_stamps_are_kept_where_they_overlap():
     close(kinematics.angular_velocity, interpolated(W, 1000.0, np.arange(31, 100) / 1000 - 0.0305), 1e-9)
 
 
+@pytest.mark.parametrize("samples", [99, 60, 3])
+@pytest.mark.parametrize("stamped", [False, True], ids=["rate", "stamps"])
+@pytest.mark.parametrize("shorter", [0, 1, 2])
+def test_records_of_one_rate_and_other_lengths_are_kept_where_they_overlap(samples, stamped, shorter):
+    time_s = np.arange(100) / 1000.0
+    lengths = [samples if i == shorter else 100 for i in range(3)]
+    sent = [
+        Signal(x[:n], unit, time_s=time_s[:n]) if stamped else Signal(x[:n], unit, 1000.0)
+        for x, n, unit in zip((A, W, ALPHA), lengths, ("g", "rad/s", "rad/s^2"), strict=True)
+    ]
+    found = prepare(Recording(*sent, low_pass=NO_FILTER)).kinematics
+    assert (found.samples, found.sample_rate_hz) == (samples, pytest.approx(1000.0, rel=1e-12))
+    for values, all_of_it in zip(
+        (found.linear_acceleration_g, found.angular_velocity, found.angular_acceleration), (A, W, ALPHA), strict=True
+    ):
+        close(values, all_of_it[:samples])
+
+
+@pytest.mark.parametrize(("at", "noted"), [(70, True), (59, False), (62, True)])
+@pytest.mark.parametrize("rate_hz", [1000.0, 3000.0])
+def test_a_peak_where_another_signal_was_not_recorded_is_noted(at, noted, rate_hz):
+    a = np.zeros((100, 3))
+    a[20, 0], a[at, 0] = 30.0, 50.0
+    w = burst(GENERATOR, round(59 * rate_hz / 1000) + 1, 8.0)
+    notes = prepare(Recording(Signal(a, "g", 1000.0), Signal(w, "rad/s", rate_hz), low_pass=NO_FILTER)).notes
+    assert [(note.code, note.severity, note.signal) for note in notes if note.code == "peak_cut_off"] == (
+        [("peak_cut_off", "warning", "linear_acceleration")] if noted else []
+    )
+    assert not noted or ("50" in notes[-1].detail and "30" in notes[-1].detail)
+
+
 def test_overlap_of_three_samples_is_enough():
     time_s = np.arange(100) / 1000.0
     found = prepare(Recording(Signal(A, "g", time_s=time_s), Signal(W, "rad/s", time_s=time_s + 0.097)))

@@ -71,9 +71,9 @@ def signals(draw, name: str, samples: int) -> Signal:
 
 @st.composite
 def recordings(draw) -> Recording:
-    samples = draw(st.sampled_from([3, 40, 100]))
+    lengths = draw(st.sampled_from([(3,), (40,), (100,), (100,), (100, 60, 99)]))
     names = draw(st.sampled_from([(0, 1), (0, 1), (0, 1, 2), (0,), (1,), (2,), (0, 2)]))
-    given_signals = {list(UNITS)[i]: draw(signals(list(UNITS)[i], samples)) for i in names}
+    given_signals = {list(UNITS)[i]: draw(signals(list(UNITS)[i], lengths[i % len(lengths)])) for i in names}
     if draw(st.integers(0, 9)) == 0 and {0, 1} <= set(names):
         sent = given_signals["linear_acceleration"]
         given_signals["angular_velocity"] = replace(sent, values=sent.values / 9, unit="rad/s")

@@ -38,6 +38,18 @@ class TestScore:
         assert answer.status_code == 200
         assert "implausible_units" in {note["code"] for note in answer.json()["quality"]}
 
+    @pytest.mark.parametrize(
+        ("shorter", "other"),
+        [("linear_acceleration", "angular_velocity"), ("angular_velocity", "linear_acceleration")],
+    )
+    def test_signals_of_other_lengths_are_scored_where_they_overlap(self, api: Api, shorter: str, other: str) -> None:
+        sent = score_body(include=["traces"])
+        cut = sent["kinematics"][shorter]
+        cut.update({axis: cut[axis][:80] for axis in "xyz"})
+        answer = api.post("/v1/score", json=sent)
+        assert answer.status_code == 200
+        assert len(answer.json()["traces"][other]["x"]) == 80
+
     def test_operating_points_are_answered_in_the_order_asked(self, api: Api) -> None:
         asked = [
             {"criterion": "bam", "sensitivity": 0.9},
