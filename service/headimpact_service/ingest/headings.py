@@ -13,7 +13,7 @@ from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest import mapping as mappings
 
 _NO_SIGN_OR_LETTER = re.compile(r"[^0-9a-z]+")
-_WORDED = str.maketrans({"°": "deg", "µ": "u", "μ": "u"})
+_WORDED = str.maketrans({"°": "deg", "µ": "u", "μ": "u", "ω": "omega", "α": "alpha"})
 MAX_COMPACT = 200
 
 
@@ -32,6 +32,11 @@ class Headings:
         self.units = units or {}
         self._exact = _places(self.written)
         self._compact = _places([compact(heading) for heading in self.written])
+
+    @property
+    def spoken(self) -> list[str]:
+        """The headings, each with the unit that stands beside it in the file."""
+        return [f"{heading} {self.units.get(place, '')}" for place, heading in enumerate(self.written)]
 
     def find(self, spellings: Sequence[str]) -> int | None:
         """The column that one of the spellings names; a heading as written wins over a looser match.
@@ -85,6 +90,7 @@ class Vocabulary:
     def __init__(self, table: Mapping[str, Any]) -> None:
         """Spell out all headings of a preset's vocabulary."""
         self._meanings: dict[str, Meaning] = {}
+        self._stems: dict[str, tuple[SignalName, str]] = {}
         for signal in SIGNALS:
             self._learn(signal, table[signal])
         for word in table["time"]["words"]:
@@ -95,6 +101,7 @@ class Vocabulary:
         words = [compact(word) for word in words_and_units["words"]]
         for word in words:
             for axis in AXES:
+                self._stems |= dict.fromkeys(_stems(word, axis), (signal, axis))
                 for unit, spelling in _units(words_and_units):
                     for stem in _stems(word, axis):
                         self._add(stem + spelling, Meaning(signal, axis, unit))
@@ -107,10 +114,23 @@ class Vocabulary:
         """What a heading says, if it is made of known words; one too long for a mapping says nothing."""
         return self._meanings.get(compact(heading)) if len(heading) <= MAX_COMPACT else None
 
+    def components(self, headings: Headings) -> dict[SignalName, list[str]]:
+        """For each signal, three headings that begin with words for its components and go on alike, however they do."""
+        found: dict[tuple[SignalName, str], dict[str, str]] = {}
+        for heading, said in zip(headings.written, headings.spoken, strict=True):
+            name = compact(said)
+            stem = next((name[:end] for end in range(len(name), 1, -1) if name[:end] in self._stems), None)
+            if stem is not None:
+                signal, axis = self._stems[stem]
+                found.setdefault((signal, name.removeprefix(stem)), {}).setdefault(axis, heading)
+        whole = {signal: by_axis for (signal, _), by_axis in found.items() if len(by_axis) == len(AXES)}
+        return {signal: [by_axis[axis] for axis in AXES] for signal, by_axis in whole.items()}
+
     def mapping(self, headings: Headings) -> mappings.Mapping:
         """The mapping that a table's headings, each with the unit beside it, amount to."""
-        spoken = [f"{heading} {headings.units.get(place, '')}" for place, heading in enumerate(headings.written)]
-        understood = [(heading, self.understand(said)) for heading, said in zip(headings.written, spoken, strict=True)]
+        understood = [
+            (heading, self.understand(said)) for heading, said in zip(headings.written, headings.spoken, strict=True)
+        ]
         found = [(heading, meaning) for heading, meaning in understood if meaning is not None]
         fields: dict[str, Any] = {}
         for signal in SIGNALS:

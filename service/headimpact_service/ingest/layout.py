@@ -61,6 +61,7 @@ class Layout:
     reading: dict[str, int]
     unscorable: int | None
     time_base: int | None
+    sample_number: int | None
 
     @property
     def numbers(self) -> list[int]:
@@ -68,7 +69,8 @@ class Layout:
         signals = self.signals.values()
         clocks = [clock.column for clock in (self.clock, *(signal.clock for signal in signals)) if clock is not None]
         resultants = [signal.resultant for signal in signals if signal.resultant is not None]
-        return sorted({*clocks, *resultants, *(column for signal in signals for column in signal.columns)})
+        counted = [] if self.sample_number is None else [self.sample_number]
+        return sorted({*clocks, *resultants, *counted, *(column for signal in signals for column in signal.columns)})
 
     @property
     def texts(self) -> list[int]:
@@ -117,6 +119,7 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
         reading=_named("reading", mapping.reading, headings, required),
         unscorable=_optional("unscorable", mapping.unscorable, headings, required),
         time_base=_optional("time_base", mapping.time_base, headings, required),
+        sample_number=_optional("sample_number", mapping.sample_number, headings, required),
     )
 
 

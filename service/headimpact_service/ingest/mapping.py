@@ -50,8 +50,8 @@ class SignalColumns(Strict):
     """The columns of one signal; a `-` before a heading turns the component's sign.
 
     `time` and `sample_rate_hz` are for a sensor that has its own. Of several columns of times with one heading, a
-    signal's is the nearest before its own; its rows end where both its time and its samples are empty. `resultant` is
-    the device's own, to be compared with that of the samples.
+    signal's is the nearest before its own. The rows of such a sensor end where its samples, and its time if it has a
+    column of it, are empty. `resultant` is the device's own, to be compared with that of the samples.
     """
 
     unit: str | None = None
@@ -119,6 +119,8 @@ class Mapping(Strict):
     `zero` says what the stamps count from: `record_start` (their first is the record's start), `trigger` (time zero is
     the trigger). Left out, stamps that run from before zero to after it count from the trigger, others from the start.
 
+    `sample_number` counts the samples of an impact one by one: a number that is left out or out of order is refused.
+
     `context` and `reading` are columns of what an impact says of itself: its context, and how its samples are to be
     read, each as in the JSON of an impact; the impact's first row counts. `time_base` parts the rows of an impact whose
     signals do not share their times: rows with one value in it go together, and a signal is in one part only.
@@ -140,6 +142,7 @@ class Mapping(Strict):
     reading: dict[ReadingField, Spellings] | None = None
     unscorable: Spellings | None = None
     time_base: Spellings | None = None
+    sample_number: Spellings | None = None
     occurred_at: Spellings | DateAndTime | None = None
     axes: Axes | None = None
     location: Location | None = None

@@ -142,6 +142,7 @@ class TableImpact:
     def _recording(self, *, scorable: bool) -> Recording:
         mapping, options, reading = self.mapping, self.options, self.reading
         fill_gaps = options.fill_gaps or reading.fill_gaps or bool(mapping.fill_gaps)
+        self._require_counted(allow_gaps=fill_gaps)
         tracks = self._tracks()
         for track in tracks:
             self._require_whole(track, samples=scorable and not fill_gaps)
@@ -210,11 +211,20 @@ class TableImpact:
         signal = self.layout.signals[name]
         clock = signal.clock or self.layout.clock
         rate = self.options.sample_rate_hz or reading.sample_rate_hz
-        if signal.clock is not None or self.samples.has_ends:
+        if signal.clock is not None or signal.sample_rate_hz is not None or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         if clock is None:
-            return Track(name, rows, rate or signal.sample_rate_hz or self.mapping.sample_rate_hz, None, 1.0)
+            return self._counted(
+                Track(name, rows, rate or signal.sample_rate_hz or self.mapping.sample_rate_hz, None, 1.0)
+            )
         return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
+
+    def _counted(self, track: Track) -> Track:
+        """A track of a rate, on stamps where the file's own numbers leave out samples."""
+        column = self.layout.sample_number
+        if column is None or track.rate is None or (np.diff(self.samples.numbers[column][track.rows]) == 1).all():
+            return track
+        return Track(track.name, track.rows, None, self._stamps(column, track.rows), 1000.0 / track.rate)
 
     def _stamps(self, column: int, rows: Rows) -> FloatArray:
         """The stamps of rows; signals that share both share the array."""
@@ -231,6 +241,23 @@ class TableImpact:
         there = np.logical_or.reduce([~np.isnan(self.samples.numbers[column][rows]) for column in columns])
         count = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
         return slice(rows.start, rows.start + count) if isinstance(rows, slice) else rows[:count]
+
+    def _require_counted(self, *, allow_gaps: bool) -> None:
+        """Refuse samples that the file's own numbers say are out of order, or missing unless gaps are to be filled."""
+        column = self.layout.sample_number
+        if column is None:
+            return
+        numbers = self.samples.numbers[column][self.rows]
+        self.samples.require_finite([column], self.rows, self.samples.window.first + self.first)
+        steps = np.diff(numbers)
+        stray = np.flatnonzero(steps <= 0 if allow_gaps else steps != 1)
+        if stray.size:
+            before, after = numbers[stray[0] : stray[0] + 2].tolist()
+            raise label_fault(
+                f"Sample {after:g} follows sample {before:g} in the impact that begins in row "
+                f"{self.samples.window.first + self.first + 1} below the headings: some are missing or out of order.",
+                "sample-order",
+            )
 
     def _require_whole(self, track: Track, *, samples: bool) -> None:
         """Refuse a missing time, and a missing sample unless it is to be filled or never to be scored."""

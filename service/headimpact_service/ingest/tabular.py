@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from headimpact.quality import words
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.file_names import named_facts
-from headimpact_service.ingest.headings import Headings
+from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.layout import Layout, lay_out
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
-from headimpact_service.ingest.presets import Preset, preset_named, recognise
+from headimpact_service.ingest.presets import Preset, preset_named, recognise, spoken_of
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.table_impact import Plan, Samples, TableImpact
@@ -29,6 +30,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     headings = Headings(table.headings, table.units)
     plan = _plan(headings, options, format_name)
     layout = lay_out(plan.mapping, headings, plan.required)
+    _require_read(layout, headings, options)
     _require_rate(layout, plan)
     blocks = table.blocks(layout.numbers, layout.texts)
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
@@ -77,6 +79,20 @@ def _preset(headings: Headings, options: ImportOptions) -> Preset | None:
 def _names_signals(mapping: Mapping) -> bool:
     signals = (mapping.linear_acceleration, mapping.angular_velocity, mapping.angular_acceleration)
     return any(s is not None and (s.x or s.y or s.z) for s in signals)
+
+
+def _require_read(layout: Layout, headings: Headings, options: ImportOptions) -> None:
+    """Refuse columns that seem to be a signal and would not be read, unless a mapping says which are."""
+    if options.mapping is not None and _names_signals(options.mapping):
+        return
+    for signal, columns in spoken_of(headings).items():
+        if signal not in layout.signals:
+            raise layout_problem(
+                f"The columns {', '.join(columns)} seem to be the {words(signal)}, in a unit or for a device that is "
+                "not known: name the columns of every signal, and their units, in a mapping.",
+                code="columns-not-read",
+                pointer=f"/{signal}",
+            )
 
 
 def _names_columns(mapping: Mapping) -> Iterator[str]:

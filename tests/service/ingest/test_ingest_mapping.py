@@ -13,6 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ingest_files import GENERIC, codes, csv_text, half_sine, one, outcome, read, refused, six_axis, statuses
 
+from headimpact.errors import TraceError
+from headimpact.preparation import prepare
 from headimpact.recording import Signal
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.headings import Headings, Vocabulary, compact
@@ -325,8 +327,75 @@ def test_an_swa_files_broken_time_must_be_given_beside_it():
     assert one(swa("1", time="37:10.6"), sample_rate_hz=1000.0, occurred_at=when).occurred_at == when
 
 
+def swa_without(*numbers: int) -> str:
+    lines = swa("1").split("\n")
+    return "\n".join(line for place, line in enumerate(lines, -1) if place not in numbers)
+
+
+def test_a_sample_that_an_swa_files_own_numbers_leave_out_is_refused_unless_it_may_be_filled():
+    stated = {"sample_rate_hz": 1000.0, "time_zone": "UTC"}
+    whole, without = one(swa("1"), **stated), swa_without(7)
+    problem = refused(without, **stated)
+    assert codes(problem) == [(None, "sample-order")]
+    assert "Sample 8 follows sample 6" in problem.detail
+    filled = one(without, fill_gaps=True, **stated).recording
+    motion = prepare(filled)
+    assert [note.code for note in motion.notes if note.code == "gaps_filled"]
+    assert motion.kinematics.samples == whole.recording.linear_acceleration.values.shape[0]
+    with pytest.raises(TraceError, match="steps between time stamps"):  # too many to fill
+        prepare(one(swa_without(*range(7, 12)), fill_gaps=True, **stated).recording)
+
+
+def test_rows_that_an_swa_files_own_numbers_have_in_another_order_are_refused():
+    heading, *rows = swa("1").split("\n")
+    for fill_gaps in (False, True):
+        problem = refused(
+            "\n".join([heading, *rows[20:], *rows[:20]]), sample_rate_hz=1000.0, time_zone="UTC", fill_gaps=fill_gaps
+        )
+        assert codes(problem) == [(None, "sample-order")]
+        assert "Sample 0 follows sample" in problem.detail
+    doubled = refused("\n".join([heading, rows[0], *rows]), sample_rate_hz=1000.0, time_zone="UTC")
+    assert "Sample 0 follows sample 0" in doubled.detail
+
+
 def test_an_swa_files_local_time_needs_a_zone():
     assert codes(refused(swa("1"), sample_rate_hz=1000.0)) == [("occurred_at", "offset-missing")]
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        ["wx (mdps)", "wy (mdps)", "wz (mdps)"],
+        ["Gyro X [rpm]", "Gyro Y [rpm]", "Gyro Z [rpm]"],
+        ["ωx (krad/s)", "ωy (krad/s)", "ωz (krad/s)"],
+        ["x rotational velocity filtered", "y rotational velocity filtered", "z rotational velocity filtered"],
+    ],
+)
+def test_columns_that_seem_to_be_a_signal_are_never_passed_over(columns):
+    text = table(",".join(["t_ms,ax_g,ay_g,az_g", *columns]))
+    problem = refused(text)
+    assert codes(problem) == [("/angular_velocity", "columns-not-read")]
+    assert columns[0] in problem.detail
+    only = {"linear_acceleration": {"unit": "g", "x": "ax_g", "y": "ay_g", "z": "az_g"}}
+    record = one(text, mapping=mapping(only | {"time": {"column": "t_ms", "unit": "ms"}}))
+    assert record.recording.angular_velocity is None
+
+
+def test_a_devices_signal_in_another_unit_is_not_passed_over_by_its_preset():
+    heading = "t.ms,PAV.X.radsec,PAV.Y.radsec,PAV.Z.radsec,PLA.X.g,PLA.Y.g,PLA.Z.g"
+    assert codes(refused(table(heading), preset="prevent")) == [("/linear_acceleration", "columns-not-read")]
+
+
+@pytest.mark.parametrize("extra", ["ayes,azes", "wx_ok,wy_ok", "wx_ok,wy_ok,wz_raw", "ax_raw,ay_raw,az_raw"])
+def test_columns_that_are_no_whole_signal_or_a_signals_other_form_are_passed_over(extra):
+    record = one(table("t_ms,ax_g,ay_g,az_g," + extra))
+    assert record.recording.angular_velocity is None
+
+
+def test_greek_letters_and_signs_of_degrees_are_read():
+    record = one(table("t_ms,ωx (°/s),ωy (°/s),ωz (°/s),αx (rad/s²),αy (rad/s²),αz (rad/s²)"))
+    assert record.recording.angular_velocity.unit == "deg/s"
+    assert record.recording.angular_acceleration.unit == "rad/s^2"
 
 
 def test_a_named_preset_may_lack_a_whole_signal_but_not_a_part_of_one():

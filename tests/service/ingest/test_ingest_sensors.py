@@ -88,6 +88,20 @@ class TestOwnTimes:
         assert recording.linear_acceleration.sample_rate_hz == 1600.0
         assert (recording.angular_velocity.sample_rate_hz, recording.angular_velocity.declared_range) == (2000.0, 34.9)
 
+    def test_the_rows_of_a_sensor_with_a_rate_of_its_own_end_where_its_cells_are_empty(self):
+        own = mapping(
+            linear_acceleration=ACCELERATION | {"sample_rate_hz": 1600},
+            angular_velocity=VELOCITY | {"sample_rate_hz": 2000},
+        )
+        rows: list[list[Any]] = six_axis().tolist()
+        for row in rows[30:]:
+            row[:3] = ["", "", ""]
+        recording = one(table(SIX, rows), mapping=own).recording
+        assert recording.linear_acceleration.values.shape[0] == 30
+        assert recording.angular_velocity.values.shape[0] == len(rows)
+        rows[10][1] = ""
+        assert codes(refused(table(SIX, rows), mapping=own)) == [(None, "missing-sample")]
+
     def test_a_signal_without_times_or_rate_beside_one_that_has_them_is_refused(self):
         own = mapping(linear_acceleration=ACCELERATION | {"sample_rate_hz": 1600})
         assert codes(refused(table(SIX, six_axis().tolist()), mapping=own)) == [("sample_rate_hz", "rate-missing")]

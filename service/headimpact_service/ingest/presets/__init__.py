@@ -70,8 +70,17 @@ def _in_unit(name: SignalName, columns: SignalColumns, headings: Headings) -> Si
 @cache
 def _spoken_units() -> dict[SignalName, dict[str, list[str]]]:
     """How headings spell each signal's units."""
-    words = next(preset.vocabulary for preset in presets().values() if preset.vocabulary is not None)
+    words = _generic().vocabulary or {}
     return {name: words[name]["units"] for name in SIGNALS}
+
+
+def _generic() -> Preset:
+    return next(preset for preset in presets().values() if preset.vocabulary is not None)
+
+
+def spoken_of(headings: Headings) -> dict[SignalName, list[str]]:
+    """The columns that seem to be those of a signal, whatever layout they are read by."""
+    return _vocabulary(_generic().name).components(headings)
 
 
 @cache
@@ -188,9 +197,21 @@ def _vocabulary_shown(signal: str, words: dict[str, Any]) -> dict[str, Any]:
     return {"signal": signal, "axis": None, "unit": None, "words": words["words"], "units": words["units"]}
 
 
+_LABELS = (
+    "external_id",
+    "athlete",
+    "device",
+    "session_id",
+    "occurred_at",
+    "unscorable",
+    "time_base",
+    "sample_number",
+)
+
+
 def _labels_shown(mapping: Mapping) -> list[dict[str, Any]]:
     labels: list[dict[str, Any]] = []
-    for name in ("external_id", "athlete", "device", "session_id", "occurred_at", "unscorable", "time_base"):
+    for name in _LABELS:
         spellings = getattr(mapping, name)
         parts = [spellings.date, spellings.time] if isinstance(spellings, DateAndTime) else [spellings]
         labels += [{"field": name, "headings": part} for part in parts if part is not None]
