@@ -51,11 +51,19 @@ class LineCells(Sequence[str]):
 
     def __init__(self, lines: Sequence[str], delimiter: str, column: int) -> None:
         """Nothing is split yet."""
-        self._lines, self._delimiter, self._column = lines, delimiter, column
+        self._lines, self._delimiter, self.column = lines, delimiter, column
 
     def __len__(self) -> int:
         """Rows."""
         return len(self._lines)
+
+    def mark_where_beginnings_differ(self, changed: NDArray[np.bool_]) -> None:
+        """Mark the rows that differ from the one above in this column or in any before it."""
+        beginning = None
+        for row, line in enumerate(self._lines):
+            if beginning is None or not line.startswith(beginning):
+                changed[row] |= beginning is not None
+                beginning = line[: len(line) - len(line.split(self._delimiter, self.column + 1)[-1])]
 
     @overload
     def __getitem__(self, row: int) -> str: ...
@@ -64,12 +72,12 @@ class LineCells(Sequence[str]):
     def __getitem__(self, row: int | slice) -> str | Sequence[str]:
         """A cell, or some rows."""
         if isinstance(row, slice):
-            return LineCells(self._lines[row], self._delimiter, self._column)
-        return self._lines[row].split(self._delimiter, self._column + 1)[self._column].rstrip("\r\n")
+            return LineCells(self._lines[row], self._delimiter, self.column)
+        return self._lines[row].split(self._delimiter, self.column + 1)[self.column].rstrip("\r\n")
 
     def __iter__(self) -> Iterator[str]:
         """Cell by cell; only the last of a line has its end."""
-        delimiter, column = self._delimiter, self._column
+        delimiter, column = self._delimiter, self.column
         if self._lines and self._lines[0].count(delimiter) == column:
             return (line.rsplit(delimiter, 1)[-1].rstrip("\r\n") for line in self._lines)
         return iter([line.split(delimiter, column + 1)[column] for line in self._lines])
@@ -80,7 +88,7 @@ class Stacked(Sequence[str]):
 
     def __init__(self, parts: Sequence[Sequence[str]]) -> None:
         """The blocks' columns in order."""
-        self._parts = parts
+        self.parts = parts
         self._starts = [0, *accumulate(map(len, parts))]
 
     def __len__(self) -> int:
@@ -95,11 +103,11 @@ class Stacked(Sequence[str]):
         """A cell, or some rows that follow each other."""
         if isinstance(row, int):
             part = bisect_right(self._starts, row) - 1
-            return self._parts[part][row - self._starts[part]]
+            return self.parts[part][row - self._starts[part]]
         start, stop, _ = row.indices(len(self))
-        pairs = zip(self._parts, self._starts, strict=False)
+        pairs = zip(self.parts, self._starts, strict=False)
         return Stacked([part[max(start - at, 0) : max(stop - at, 0)] for part, at in pairs if at < stop])
 
     def __iter__(self) -> Iterator[str]:
         """Cell by cell."""
-        return chain.from_iterable(self._parts)
+        return chain.from_iterable(self.parts)

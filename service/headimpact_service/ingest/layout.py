@@ -64,6 +64,16 @@ class Layout:
     sample_number: int | None
 
     @property
+    def labels(self) -> list[int]:
+        """Columns of what is true of an impact as a whole, those that tell impacts apart among them.
+
+        When it was is not: its parts may be those of each sample. Nor is how parts of an impact are to be read.
+        """
+        reading = self.reading.values() if self.time_base is None else ()
+        one_each = (self.external_id, self.athlete, self.device, self.unscorable)
+        return sorted({c for c in (*one_each, *self.keys, *self.context.values(), *reading) if c is not None})
+
+    @property
     def numbers(self) -> list[int]:
         """Columns that are read as numbers."""
         signals = self.signals.values()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -10,6 +10,7 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from headimpact.filtering import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant
@@ -17,7 +18,7 @@ from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
 from headimpact_service.ingest.formula_cells import unguarded
-from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
+from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES, MIN_RATE_HZ
 from headimpact_service.ingest.impact_reading import low_pass, mounting
 from headimpact_service.ingest.labels import (
     NOTHING_SAID,
@@ -33,9 +34,13 @@ from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.stamps import before_zero_ms
+from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, Window
+
+ROUNDED_TO_S = 1.0
+"""Times of samples may be written to the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +63,21 @@ class Samples:
         columns = window.columns
         self.layout, self.window, self.texts, self.numbers = layout, window, columns.texts, columns.numbers
         self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
+        self._changes = self._changed(layout)
         self._finite = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
+
+    def _changed(self, layout: Layout) -> NDArray[np.intp] | None:
+        """How often what rows say of their impact has changed, row by row; None where nothing is said in rows."""
+        columns = sorted({*layout.labels, *layout.occurred_at})
+        if not columns or self.window.columns.lengths is not None:
+            return None
+        return np.cumsum(changed_rows(self.texts, columns, self.window.columns.rows))
+
+    def are_alike(self, rows: Rows) -> bool:
+        """Whether the rows surely say the same of their impact; where not, one has to look."""
+        if self._changes is None:
+            return True
+        return isinstance(rows, slice) and bool(self._changes[rows.start] == self._changes[rows.stop - 1])
 
     @property
     def has_ends(self) -> bool:
@@ -105,6 +124,8 @@ class TableImpact:
     def record(self) -> ImpactRecord:
         """The impact, with what the sender gave beside the file in place of what the file says."""
         options, named = self.options, self.plan.named
+        if not self.samples.are_alike(self.rows):
+            self._require_one_impact()
         unscorable = self._text(self.layout.unscorable)
         recording = self._recording(scorable=unscorable is None)
         return ImpactRecord(
@@ -319,6 +340,39 @@ class TableImpact:
             reported = self.samples.numbers[layout.resultant][track.rows]
             self.notes += check_reported_resultant(track.name, layout.unit, reported, values)
         return Signal(values, layout.unit, *base, layout.full_scale)
+
+    def _require_one_impact(self) -> None:
+        """Refuse rows that say different things of their impact: they are several, and nothing tells them apart."""
+        for column in self.layout.labels:
+            cells = self._distinct(column)
+            if len(cells) > 1 and (len(cells) > 2 or cells[0] == "" or "" not in cells):
+                raise self._several(f"Column {column + 1} does not say the same")
+        columns = [] if self.options.occurred_at is not None else self.layout.occurred_at
+        if any(len(self._distinct(column)) > 1 for column in columns):
+            self._require_one_time(columns)
+
+    def _distinct(self, column: int) -> list[str]:
+        """What the impact's rows say in a column, in their order."""
+        cells = self.samples.texts[column]
+        said = cells[self.rows] if isinstance(self.rows, slice) else map(cells.__getitem__, self.rows)
+        return list(dict.fromkeys(cell.strip() for cell in said))
+
+    def _require_one_time(self, columns: Sequence[int]) -> None:
+        """Times that go on from sample to sample are those of the samples; others are of several impacts."""
+        texts = [self.samples.texts[column] for column in columns]
+        rows = range(self.rows.start, self.rows.stop) if isinstance(self.rows, slice) else self.rows
+        told = dict.fromkeys(tuple(cells[row].strip() for cells in texts) for row in rows)
+        moments = [moment(list(parts), self.options.time_zone) for parts in told if all(parts)]
+        known = [when for when in moments if when is not None]
+        if known and (max(known) - min(known)).total_seconds() > len(rows) / MIN_RATE_HZ + ROUNDED_TO_S:
+            raise self._several("The time of the impact is not the same")
+
+    def _several(self, what: str) -> Problem:
+        return label_fault(
+            f"{what} in all rows of the impact that begins in row {self.samples.window.first + self.first + 1} below "
+            "the headings: if they are several impacts, tell them apart by a column impact_id or a mapping's group_by.",
+            "several-impacts",
+        )
 
     def _text(self, column: int | None) -> str | None:
         if column is None:

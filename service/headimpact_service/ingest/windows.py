@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 
@@ -94,6 +94,7 @@ class _Parting:
     def window(self, columns: Columns, first: int) -> tuple[Window | None, Columns]:
         """The impacts that are complete, and the rows of the last run, which may go on."""
         runs = self._runs(columns)
+        _require_filled(runs, first)
         key, last = runs[-1]
         if last.start == 0:
             raise _unreadable(f"More than {WINDOW_ROWS} rows belong to one impact.")
@@ -103,7 +104,9 @@ class _Parting:
 
     def last_window(self, columns: Columns, first: int) -> Window:
         """The impacts of what is left."""
-        return self._window(columns, self._runs(columns), first)
+        runs = self._runs(columns)
+        _require_filled(runs, first)
+        return self._window(columns, runs, first)
 
     def _runs(self, columns: Columns) -> list[tuple[tuple[str, ...], slice]]:
         """Rows of one key that follow each other."""
@@ -123,6 +126,16 @@ class _Parting:
             raise _unreadable(_APART)
         self._given.update(parts)
         return Window(columns, [rows[0] if len(rows) == 1 else _joined(rows) for rows in parts.values()], first)
+
+
+def _require_filled(runs: Sequence[tuple[tuple[str, ...], slice]], first: int) -> None:
+    """Refuse a name that stands in the first row of its impact only, as merged cells of a spreadsheet are saved."""
+    for (before, _), (key, rows) in pairwise(runs):
+        if all(part in {named, ""} for named, part in zip(before, map(str.strip, key), strict=True)):
+            raise _unreadable(
+                f"Row {first + rows.start + 1} below the headings leaves out what tells impacts apart, which the row "
+                "above it says: write it in every row."
+            )
 
 
 _APART = f"In a file of more than {WINDOW_ROWS} rows, the rows of one impact follow each other: sort it by impact."
