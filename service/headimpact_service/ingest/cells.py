@@ -63,7 +63,8 @@ class LineCells(Sequence[str]):
         for row, line in enumerate(self._lines):
             if beginning is None or not line.startswith(beginning):
                 changed[row] |= beginning is not None
-                beginning = line[: len(line) - len(line.split(self._delimiter, self.column + 1)[-1])]
+                behind = line.split(self._delimiter, self.column + 1)[self.column + 1 :]
+                beginning = line[: len(line) - len("".join(behind))]
 
     @overload
     def __getitem__(self, row: int) -> str: ...
