@@ -18,6 +18,9 @@ Body = TypeVar("Body", bound=BaseModel)
 MAX_MEMBERS = 5000
 """Of one body: an impact has about sixty. Every unknown one costs a kilobyte of error."""
 
+MAX_VALUES = 400_000
+"""Of one body: the longest record has 240 000 samples and times."""
+
 MAX_POINTER = 200
 """Characters of a pointer that is given back: keys in it come from the caller."""
 
@@ -27,13 +30,22 @@ _OF_SAMPLES = frozenset({"float_type", "finite_number"})
 
 def parse(data: bytes, model: type[Body], *, what: str = "body") -> Body:
     """`data` as `model`: 400 unless it is JSON, 422 with every broken rule (up to 20) unless it fits."""
-    # Every member has its colon, so that none needs to be parsed to bound their number.
-    if data.count(b":") > MAX_MEMBERS:
-        raise too_many_members(what)
+    require_bounded(data, what)
     try:
         return model.model_validate_json(data)
     except ValidationError as error:
         raise validation_problem(error, data, what=what) from None
+
+
+def require_bounded(data: bytes, what: str) -> None:
+    """Refuse a text of which parsing would make more objects than any request needs; none is made to see it.
+
+    Every member has its colon, every list and object its bracket, every further value its comma.
+    """
+    if data.count(b":") > MAX_MEMBERS or data.count(b"[") + data.count(b"{") > MAX_MEMBERS:
+        raise too_many_members(what)
+    if data.count(b",") > MAX_VALUES:
+        raise Problem("malformed-request", f"The {what} has more than {MAX_VALUES} values, which no request needs.")
 
 
 def validation_problem(error: ValidationError, data: bytes, *, what: str = "body") -> Problem:
@@ -47,13 +59,6 @@ def validation_problem(error: ValidationError, data: bytes, *, what: str = "body
 def too_many_members(what: str) -> Problem:
     """The 400 for so many members, or ones so deeply nested, that naming what is wrong would be the attack."""
     return Problem("malformed-request", f"The {what} has more than {MAX_MEMBERS} members, which no request needs.")
-
-
-def members(document: Any) -> int:  # noqa: ANN401 - any JSON
-    """How many members a parsed object and the objects inside it have."""
-    if not isinstance(document, dict):
-        return 0
-    return len(document) + sum(members(value) for value in document.values())
 
 
 def rules_problem(errors: Sequence[PayloadError], *, what: str = "body", count: int = 0) -> Problem:

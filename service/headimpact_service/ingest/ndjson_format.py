@@ -6,20 +6,12 @@ import codecs
 from collections.abc import Iterable, Iterator
 from typing import BinaryIO
 
-from pydantic_core import from_json
-
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.impact_json import FileImpactBody
-from headimpact_service.ingest.impact_reading import to_record
-from headimpact_service.ingest.json_faults import MAX_MEMBERS, parse
-from headimpact_service.ingest.json_format import refuse_table_options, sent_name
+from headimpact_service.ingest.json_format import MAX_IMPACT, read_impact_text, refuse_table_options, sent_name
 from headimpact_service.ingest.options import ImportOptions
-from headimpact_service.ingest.overrides import with_options
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.source import Source
 
-MAX_LINE = 8 * 1024 * 1024
-"""As a JSON body: a line holds one impact."""
 _PIECE = 64 * 1024
 
 
@@ -39,31 +31,18 @@ def read_lines(lines: Iterable[tuple[int, bytes]], options: ImportOptions) -> It
         try:
             yield _read_line(line, number, options)
         except Problem as problem:
-            yield RefusedImpact(problem, _sent_name(line))
+            yield RefusedImpact(problem, sent_name(line))
     if count == 0:
         raise Problem("unreadable-file", "The file holds no impact.")
 
 
 def _read_line(line: bytes, number: int, options: ImportOptions) -> ImpactRecord:
-    what = f"impact in line {number}"
-    if len(line) > MAX_LINE:
-        raise Problem("unreadable-file", f"The {what} may have at most {MAX_LINE} bytes.")
     try:
-        body = parse(line, FileImpactBody, what=what)
+        return read_impact_text(line, options, f"impact in line {number}")
     except Problem as problem:
         if problem.slug == "malformed-request":
             raise Problem("unreadable-file", problem.detail) from None
         raise
-    return with_options(to_record(body, time_zone=options.time_zone, what=what), options)
-
-
-def _sent_name(line: bytes) -> str | None:
-    if len(line) > MAX_LINE or line.count(b":") > MAX_MEMBERS:
-        return None
-    try:
-        return sent_name(from_json(line))
-    except ValueError:
-        return None
 
 
 def _lines(source: Source) -> Iterator[tuple[int, bytes]]:
@@ -72,9 +51,9 @@ def _lines(source: Source) -> Iterator[tuple[int, bytes]]:
         if stream.read(len(codecs.BOM_UTF8)) != codecs.BOM_UTF8:
             stream.seek(0)
         number = 0
-        while line := stream.readline(MAX_LINE + 1):
+        while line := stream.readline(MAX_IMPACT + 1):
             number += 1
-            if len(line) > MAX_LINE:
+            if len(line) > MAX_IMPACT:
                 _pass_over(stream, line)
                 if not line.isspace():
                     yield number, line

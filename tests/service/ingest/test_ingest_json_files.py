@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import time
+import tracemalloc
 from datetime import UTC, datetime
 from typing import Any
 
@@ -13,9 +15,10 @@ from ingest_files import body, codes, encoded, one, outcome, read, refused, stat
 
 from headimpact.filtering import NO_FILTER
 from headimpact_service.errors import Problem
-from headimpact_service.ingest import ndjson_format
+from headimpact_service.ingest import json_format, ndjson_format
 from headimpact_service.ingest.digest import content_digest
 from headimpact_service.ingest.impact_reading import read_impact
+from headimpact_service.ingest.json_items import items
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 
@@ -75,7 +78,18 @@ def test_numbers_that_are_not_finite_or_no_numbers_are_refused_in_files_too():
     ("data", "said"),
     [
         (b"{", "not JSON"),
-        (b"[" * 10_000, "recursion limit"),
+        (b"[" * 10_000, "is not closed"),
+        (b"[" * 500 + b"]" * 500, "recursion limit"),
+        (b'[{"a": 1}', "or the end of the list"),
+        (b'[{"a": 1},]', "or the end of the list"),
+        (b'[{"a": 1} {"a": 1}]', "or the end of the list"),
+        (b'[{"a": "\\"}]', "is not closed"),
+        (b'["a]', "a value was expected"),
+        (b"[,]", "a value was expected"),
+        (b"[1] 2", "more than a list of impacts"),
+        (b'{"data": [1], "next_cursor": null}', "more than a list of impacts"),
+        (b'{"data": [1]', "more than a list of impacts"),
+        (b"[nul]", "not JSON"),
         (b'[{"a": "\\ud800"}]', "not JSON"),
         (b"[]", "no impact"),
         (b'{"data": []}', "no impact"),
@@ -85,6 +99,50 @@ def test_a_file_that_is_not_json_or_empty_is_refused(data: bytes, said: str):
     problem = refused(data)
     assert problem.slug == "unreadable-file"
     assert said in problem.detail
+
+
+any_json = st.recursive(
+    st.none() | st.integers() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+)
+
+
+@pytest.mark.parametrize("indent", [None, 1])
+@given(many=st.lists(any_json, max_size=5))
+def test_a_list_is_parted_into_its_items(indent: int | None, many: list[Any]):
+    for wrapped in (many, {"data": many}, {"impacts": many}):
+        text = json.dumps(wrapped, indent=indent, ensure_ascii=False).encode("utf-8", "surrogatepass")
+        assert [json.loads(item) for item in items(text)] == many
+
+
+@pytest.mark.parametrize("whole", ["{}", '{"data": 1}', '{"a": [1]}', "7", '"a"', " {}"])
+def test_what_is_no_list_is_one_item(whole: str):
+    assert list(items(whole.encode())) == [whole.encode()]
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        b"[]" + b",[]" * 3_000_000,
+        b"{}" + b",{}" * 3_000_000,
+        b"[" + b"[]," * 2_000_000 + b"[]]",
+        b"1" + b",1" * 4_000_000,
+    ],
+    ids=["lists", "objects", "nested", "numbers"],
+)
+def test_millions_of_small_values_never_become_objects(inside: bytes):
+    tracemalloc.start()
+    try:
+        refused(b"[" + inside + b"]", max_impacts=1000)
+        assert tracemalloc.get_traced_memory()[1] < 3 * len(inside)
+    finally:
+        tracemalloc.stop()
+
+
+def test_quotes_that_never_close_cost_no_more_than_their_text():
+    start = time.process_time()
+    assert "is not closed" in refused(b'[{"a": "' + b'\\"' * 1_000_000).detail
+    assert time.process_time() - start < 2.0
 
 
 def test_an_impact_of_thousands_of_members_is_refused():
@@ -121,7 +179,8 @@ def test_one_line_is_ndjson_by_name_or_type():
 
 
 def test_a_line_is_bounded(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(ndjson_format, "MAX_LINE", 5000)
+    monkeypatch.setattr(json_format, "MAX_IMPACT", 5000)
+    monkeypatch.setattr(ndjson_format, "MAX_IMPACT", 5000)
     items = read(lines(body(external_id="a"), b"{" + b" " * 6000 + b"}", body(external_id="c")))
     assert ids(items) == ["a", "unreadable-file", "c"]
 
