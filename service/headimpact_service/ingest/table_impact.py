@@ -29,7 +29,7 @@ from headimpact_service.ingest.labels import (
     moment,
     reading_of,
 )
-from headimpact_service.ingest.layout import Layout, SignalLayout
+from headimpact_service.ingest.layout import Clock, Layout, SignalLayout
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
@@ -39,6 +39,8 @@ from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, Window
 
+MAX_RATE_DIFFERENCE = 0.05
+"""Stamps may be rounded; a rate of another sensor is further away."""
 ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
 
@@ -231,7 +233,7 @@ class TableImpact:
     def _track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
         signal = self.layout.signals[name]
         clock = signal.clock or self.layout.clock
-        rate = self.options.sample_rate_hz or reading.sample_rate_hz
+        rate = self.options.sample_rate_hz or self._said_rate(reading, clock, rows)
         if signal.clock is not None or signal.sample_rate_hz is not None or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         if clock is None:
@@ -239,6 +241,21 @@ class TableImpact:
                 Track(name, rows, rate or signal.sample_rate_hz or self.mapping.sample_rate_hz, None, 1.0)
             )
         return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
+
+    def _said_rate(self, reading: Reading, clock: Clock | None, rows: Rows) -> float | None:
+        """The rate that the impact's own row says; 422 where its stamps say another."""
+        rate = reading.sample_rate_hz
+        if rate is None or clock is None:
+            return rate
+        stamps = self._stamps(clock.column, rows)
+        steps = np.diff(stamps[np.isfinite(stamps)]) * clock.milliseconds
+        if steps.size and abs(float(np.median(steps)) * rate / 1000.0 - 1.0) > MAX_RATE_DIFFERENCE:
+            raise label_fault(
+                f"The impact's sample_rate_hz and its times differ by more than {MAX_RATE_DIFFERENCE:.0%}.",
+                "rate-differs",
+                parameter="sample_rate_hz",
+            )
+        return rate
 
     def _counted(self, track: Track) -> Track:
         """A track of a rate, on stamps where the file's own numbers leave out samples."""

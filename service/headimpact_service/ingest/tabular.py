@@ -29,6 +29,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     """
     headings = Headings(table.headings, table.units)
     plan = _plan(headings, options, format_name)
+    _require_sensor(plan.mapping)
     layout = lay_out(plan.mapping, headings, plan.required)
     _require_read(layout, headings, options)
     _require_rate(layout, plan)
@@ -79,6 +80,16 @@ def _preset(headings: Headings, options: ImportOptions) -> Preset | None:
 def _names_signals(mapping: Mapping) -> bool:
     signals = (mapping.linear_acceleration, mapping.angular_velocity, mapping.angular_acceleration)
     return any(s is not None and (s.x or s.y or s.z) for s in signals)
+
+
+def _require_sensor(mapping: Mapping) -> None:
+    """Refuse a mounting of signals that are said to be the head's: it would change nothing."""
+    if mapping.mounting is not None and mapping.location != "sensor":
+        raise layout_problem(
+            "A mounting is for signals of the sensor: give location sensor with it.",
+            code="mounting-not-needed",
+            pointer="/mounting",
+        )
 
 
 def _require_read(layout: Layout, headings: Headings, options: ImportOptions) -> None:

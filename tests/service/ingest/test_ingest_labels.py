@@ -35,14 +35,14 @@ class TestReading:
                 filter="none",
                 constrained_plane="sagittal",
                 pre_trigger_ms=7.5,
-                sample_rate_hz=1562.5,
+                sample_rate_hz=1001.5,
                 mounting=json.dumps(MOUNTING),
                 fill_gaps="true",
             )
         ).recording
         assert (recording.axes, recording.low_pass, recording.constrained_plane) == ("sae_j211", NO_FILTER, "sagittal")
         assert (recording.pre_trigger_ms, recording.fill_gaps) == (7.5, True)
-        assert recording.linear_acceleration.sample_rate_hz == 1562.5
+        assert recording.linear_acceleration.sample_rate_hz == 1001.5
         assert recording.mounting.offset_m.tolist() == [0.07, 0.0, -0.01]
 
     def test_a_filter_may_be_an_object(self):

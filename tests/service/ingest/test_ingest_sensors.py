@@ -106,6 +106,23 @@ class TestOwnTimes:
         own = mapping(linear_acceleration=ACCELERATION | {"sample_rate_hz": 1600})
         assert codes(refused(table(SIX, six_axis().tolist()), mapping=own)) == [("sample_rate_hz", "rate-missing")]
 
+    @pytest.mark.parametrize(("rate", "said"), [(1000.0, None), (1010.0, None), (3200.0, "rate-differs")])
+    def test_a_rate_and_times_of_one_impact_must_agree(self, rate: float, said: str | None):
+        rows = [[i, *row, rate] for i, row in enumerate(six_axis().tolist())]
+        text = table(["t_ms", "ax_g", "ay_g", "az_g", "wx_rad_s", "wy_rad_s", "wz_rad_s", "sample_rate_hz"], rows)
+        if said is None:
+            assert one(text).recording.linear_acceleration.sample_rate_hz == rate
+        else:
+            assert codes(refused(text)) == [("sample_rate_hz", said)]
+
+    def test_a_mounting_of_what_is_not_a_sensor_is_refused(self):
+        turned = {"accelerometer": {"rotation": STILL, "offset_mm": [70, 10, -60]}, "gyroscope": {"rotation": STILL}}
+        rows = table(SIX, six_axis().tolist())
+        for location in ({}, {"location": "head_cg"}):
+            problem = refused(rows, mapping=mapping(sample_rate_hz=1000, mounting=turned, **location))
+            assert codes(problem) == [("/mounting", "mounting-not-needed")]
+        assert one(rows, mapping=mapping(sample_rate_hz=1000, mounting=turned, location="sensor")).recording.mounting
+
 
 class TestDroppedSamples:
     def test_the_time_before_the_trigger_is_shortened_by_a_rate_as_by_times(self):
