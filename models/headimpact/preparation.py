@@ -35,7 +35,7 @@ from headimpact.quality import (
     check_identical,
     words,
 )
-from headimpact.record_rules import derived_out_of_range, require_samples
+from headimpact.record_rules import derived_out_of_range, require_samples, transferred_out_of_range
 from headimpact.recording import FloatArray, Recording, SignalName
 from headimpact.time_base import brought, kept_of
 from headimpact.uniform import Layout, Uniform, uniform
@@ -127,10 +127,9 @@ def _prepared(plan: Plan, block: Sequence[Uniform]) -> list[Preparation | TraceE
     if faults:
         return _without(plan, block, faults)
     motion = _motion(plan, samples, noted)
-    if plan.angular_acceleration_source == "five_point_stencil":
-        faults = _derived_out_of_range(motion)
-        if faults:
-            return _without(plan, block, faults)
+    faults = _computed_out_of_range(plan, motion)
+    if faults:
+        return _without(plan, block, faults)
     return [
         Preparation(
             motion,
@@ -277,11 +276,21 @@ def _look_outside(plan: Plan, tracks: Tracks, noted: list[list[QualityNote]]) ->
             notes += check_cut_off(signal.name, float(within[place]), float(beyond[place]))
 
 
-def _derived_out_of_range(motion: Motion) -> dict[int, TraceError]:
-    """Those of which the derived angular acceleration is more than any head survives."""
-    largest = motion.magnitudes[motion.rows.angular_acceleration].max(axis=0)
-    beyond = largest > QUALITY_LIMITS["angular_acceleration"]["refused"]
-    return {place: derived_out_of_range() for place in np.flatnonzero(beyond).tolist()}
+def _computed_out_of_range(plan: Plan, motion: Motion) -> dict[int, TraceError]:
+    """Those of which what was computed from the samples is more than any head survives."""
+    faults: dict[int, TraceError] = {}
+    if plan.offset_m is not None:
+        faults |= dict.fromkeys(_beyond(motion, "linear_acceleration"), transferred_out_of_range())
+    if plan.angular_acceleration_source == "five_point_stencil":
+        faults |= dict.fromkeys(_beyond(motion, "angular_acceleration"), derived_out_of_range())
+    return faults
+
+
+def _beyond(motion: Motion, name: SignalName) -> list[int]:
+    """The places of the impacts that a signal's bound refuses."""
+    largest = motion.magnitudes[motion.signals.index(name)].max(axis=0)
+    places: list[int] = np.flatnonzero(largest > QUALITY_LIMITS[name]["refused"]).tolist()
+    return places
 
 
 @dataclass(frozen=True)

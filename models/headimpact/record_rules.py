@@ -177,6 +177,17 @@ def _faults_of_times(name: SignalName, signal: Signal) -> Iterator[TraceError]:
             yield fault
 
 
+def transferred_out_of_range() -> TraceError:
+    """The same bound for acceleration that was moved to the head's centre of gravity: its offset may be to blame."""
+    bound = QUALITY_LIMITS["linear_acceleration"]["refused"]
+    return TraceError(
+        "value-out-of-range",
+        f"The linear acceleration at the head's centre of gravity must stay within {bound:g} g; check the offset of "
+        "the mounting and the unit of the rotation.",
+        signal="linear_acceleration",
+    )
+
+
 def derived_out_of_range() -> TraceError:
     """The same bound for angular acceleration that was derived: the velocity is to blame, but no one sample of it."""
     bound = QUALITY_LIMITS["angular_acceleration"]["refused"]

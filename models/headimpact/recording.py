@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from headimpact.errors import TraceError
 from headimpact.filtering import PAPER, LowPass
-from headimpact.published import UNITS
+from headimpact.published import QUALITY_LIMITS, UNITS
 
 FloatArray = NDArray[np.float64]
 SignalName = Literal["linear_acceleration", "angular_velocity", "angular_acceleration"]
@@ -80,7 +80,7 @@ class Mounting:
     ------
     TraceError
         ``improper-rotation``, where a matrix is not orthonormal with determinant +1 within 1e-3;
-        ``improper-offset``, where the offset is no number.
+        ``improper-offset``, where the offset is no number, or one of more than 1 m.
     """
 
     accelerometer_rotation: FloatArray
@@ -95,8 +95,9 @@ class Mounting:
             ("gyroscope", self.gyroscope_rotation),
         ):
             require_proper_rotation(rotation, sensor)
-        if not np.isfinite(self.offset_m).all():
-            raise TraceError("improper-offset", "The accelerometer's offset must be three finite lengths.")
+        bound = QUALITY_LIMITS["mounting"]["maximum_offset_m"]
+        if not (np.abs(self.offset_m) <= bound).all():
+            raise TraceError("improper-offset", f"The accelerometer's offset must be three lengths within {bound:g} m.")
 
 
 @dataclass(frozen=True, slots=True)

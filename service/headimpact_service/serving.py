@@ -65,7 +65,8 @@ class GuardedProtocol(HttpToolsProtocol):
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's own words are not for callers
         """What is no HTTP, or a head of more than 64 KiB, gets the same form of answer as everything else."""
-        problem = Problem("malformed-request", "This is not an HTTP/1.1 request, or its head is too long.")
+        detail = "This is not an HTTP/1.1 request, or its method is none that is known, or its head is too long."
+        problem = Problem("malformed-request", detail)
         body = json_bytes(problem.as_dict())
         head = (
             "HTTP/1.1 400 Bad Request\r\n"

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag
 
+from headimpact.published import QUALITY_LIMITS
 from headimpact_service.ingest.times import instant, known_zone
 
 MIN_SAMPLES = 3
@@ -49,6 +50,8 @@ Moment = Annotated[datetime, BeforeValidator(_moment)]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
+Incidence = Annotated[float, Field(ge=1e-9, le=1.0 - 1e-9)]
+"""So far from 0 and 1 that no probability at it becomes either."""
 Axes = Literal["anatomical", "sae_j211"]
 Location = Literal["head_cg", "sensor"]
 Plane = Literal["sagittal", "coronal", "axial"]
@@ -163,6 +166,10 @@ Delay = Annotated[
 ]
 
 
+MAX_OFFSET_MM = 1000.0 * QUALITY_LIMITS["mounting"]["maximum_offset_m"]
+Offset = Annotated[float, Field(ge=-MAX_OFFSET_MM, le=MAX_OFFSET_MM)]
+
+
 class AccelerometerMounting(Strict):
     """How the accelerometer sits on the head."""
 
@@ -170,7 +177,7 @@ class AccelerometerMounting(Strict):
         description="Sensor axes to anatomical head axes: orthonormal with determinant +1 within 1e-3.",
         examples=[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]],
     )
-    offset_mm: Vector = Field(
+    offset_mm: Annotated[list[Offset], Field(min_length=3, max_length=3)] = Field(
         description="Its position from the head's centre of gravity, in anatomical head axes [mm].",
         examples=[[70.0, 0.0, -60.0]],
     )

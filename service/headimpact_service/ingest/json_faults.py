@@ -64,7 +64,8 @@ def too_many_members(what: str) -> Problem:
 def rules_problem(errors: Sequence[PayloadError], *, what: str = "body", count: int = 0) -> Problem:
     """The 422 for rules that a readable body breaks."""
     number = max(count, len(errors))
-    broken = "a rule" if number == 1 else f"{number} rules"
+    least = "at least " if len(errors) == MAX_ERRORS else ""  # of a list of samples only so many are counted
+    broken = "a rule" if number == 1 else f"{least}{number} rules"
     return Problem("invalid-payload", f"The {what} breaks {broken}.", errors=errors)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from headimpact.criteria import CRITERION_KEYS
-from headimpact_service.ingest.impact_json import CriterionKey, Fraction, Moment, Strict, Text, Word
+from headimpact_service.ingest.impact_json import CriterionKey, Incidence, Moment, Strict, Text, Word
 from headimpact_service.intake.scoring import Terms
 
 MAX_REPLICAS = 10_000
@@ -51,7 +51,7 @@ def _rising(bounds: list[float]) -> list[float]:
 Criteria = Annotated[
     list[Annotated[Word, AfterValidator(_known)]], Field(min_length=1, max_length=40), AfterValidator(_distinct)
 ]
-IncidenceRange = Annotated[list[Fraction], Field(min_length=2, max_length=2), AfterValidator(_rising)]
+IncidenceRange = Annotated[list[Incidence], Field(min_length=2, max_length=2), AfterValidator(_rising)]
 
 
 class FitBody(Strict):
@@ -63,7 +63,7 @@ class FitBody(Strict):
         default="case_control",
         description="`case_control` where impacts were chosen by their outcome: intercepts go to `incidence`.",
     )
-    incidence: Fraction | None = Field(default=None, description="What GET /v1/settings shows unless given.")
+    incidence: Incidence | None = Field(default=None, description="What GET /v1/settings shows unless given.")
     incidence_range: IncidenceRange | None = None
     bias_correction: Literal["king_zeng", "firth", "zelig", "none"] = "king_zeng"
     replicas: Annotated[int, Field(ge=0, le=MAX_REPLICAS)] = 1000

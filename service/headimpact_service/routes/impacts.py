@@ -73,11 +73,11 @@ async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
     return scored, new_impact(scored, content_digest(record, scored.sent_digest), call.key.id)
 
 
-def _answer(impact: Impact, status: int, scored: Scored | None, *, redelivered: bool = False) -> Response:
+def _answer(impact: Impact, status: int, scored: Scored, *, redelivered: bool = False) -> Response:
     document = impact_document(impact)
-    if redelivered and scored is not None and impact.score is not None:
+    if redelivered and impact.score is not None:
         as_asked(document["score"], impact.score, scored)
-    if scored is not None and "traces" in scored.record.include:
+    if "traces" in scored.record.include:
         document["score"]["traces"] = scored_traces(scored)
     headers = {**etag(impact.revision), "Location": f"/v1/impacts/{document['id']}"}
     return answer(json_bytes(document), status, headers)
@@ -219,7 +219,7 @@ async def correct_impact(call: Call) -> Response:
     outcome = await deps.write(
         call.request, lambda conn: impacts.correct(conn, call.data_set_id, impact_id, new, if_match=revision)
     )
-    return _answer(outcome.impact, 200, scored if outcome.status == "corrected" else None)
+    return _answer(outcome.impact, 200, scored, redelivered=outcome.status == "unchanged")
 
 
 @routes(

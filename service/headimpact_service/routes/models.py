@@ -20,7 +20,7 @@ from headimpact_service import deps
 from headimpact_service.answers import HTML, JSON, SVG, answer
 from headimpact_service.bodies import read_body, require_media_type
 from headimpact_service.errors import PayloadError, Problem, invalid_parameter, not_found
-from headimpact_service.ingest.impact_json import Strict, Text
+from headimpact_service.ingest.impact_json import Incidence, Strict, Text
 from headimpact_service.intake import registry
 from headimpact_service.operation import Answer, BodyForm, Call, Routes
 from headimpact_service.parameters import Query
@@ -68,7 +68,7 @@ class RiskMapQuery(Query):
     """Of which criteria, at which incidence."""
 
     criteria: str | None = Field(None, max_length=200, description="Keys between commas; all of rotation unless given.")
-    incidence: Annotated[float | None, Field(gt=0, lt=1, description="The model's own unless given.")] = None
+    incidence: Annotated[Incidence | None, Field(description="The model's own unless given.")] = None
 
 
 class RiskMapView(BaseModel):

@@ -11,7 +11,7 @@ from headimpact.risk import DEFAULT_OPERATING_POINTS, RiskModel
 from headimpact_service import deps
 from headimpact_service.answers import answer
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.impact_json import MAX_OPERATING_POINTS, Fraction, OperatingPointBody, Strict
+from headimpact_service.ingest.impact_json import MAX_OPERATING_POINTS, Incidence, OperatingPointBody, Strict
 from headimpact_service.intake.scoring import Terms, operating_points
 from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
 from headimpact_service.routes.operating_points import requests_of
@@ -42,7 +42,7 @@ class SettingsView(BaseModel):
 class SettingsBody(Strict):
     """What is to change; null takes a setting back to the active model's."""
 
-    incidence: Fraction | None = None
+    incidence: Incidence | None = None
     operating_points: Annotated[list[OperatingPointBody], Field(max_length=MAX_OPERATING_POINTS)] | None = None
 
 

@@ -130,7 +130,7 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
     """
     known = _look_up(conn, data_set_id, new)
     if known.same_external_id is not None:
-        return _redelivery(conn, data_set_id, new, known.same_external_id)
+        return _redelivery(conn, data_set_id, new, known, known.same_external_id)
     if same_event_is_unchanged and known.same_content is not None:
         same = _same_event(conn, data_set_id, new, known)
         if same is not None:
@@ -169,14 +169,26 @@ def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Kn
     return None if found is None else get(conn, data_set_id, found[0])
 
 
-def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, impact_id: bytes) -> Outcome:
+def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known, impact_id: bytes) -> Outcome:
     """The stored impact of the same external id, if the content is that of one of its revisions."""
     stored_impact = get(conn, data_set_id, impact_id)
     if stored_impact is None:
         raise Problem("impact-deleted", "The impact with this external_id was deleted.")
     if any(kept.content_digest == new.content_digest for kept in revisions(conn, data_set_id, impact_id)):
         return Outcome("unchanged", stored_impact)
+    if _is_the_same_by_another_name(new, known, stored_impact):
+        return Outcome("unchanged", stored_impact)
     raise Problem("external-id-conflict", "An impact with this external_id exists with other content.")
+
+
+def _is_the_same_by_another_name(new: NewImpact, known: _Known, present: Impact) -> bool:
+    """Whether only the athlete is called otherwise: by our id, or as they are called now."""
+    if known.athlete is None or new.document != present.document:
+        return False
+    content = content_members(new, known.athlete, known.device)
+    return new.device_serial == present.device_serial and all(
+        getattr(present, name) == value for name, value in content.items() if name != "device_id"
+    )
 
 
 def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact:

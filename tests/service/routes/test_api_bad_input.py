@@ -14,6 +14,7 @@ from headimpact_service.settings import Settings
 LINEAR = "/kinematics/linear_acceleration"
 STILL = [float(i) for i in range(50)] + [49.0] + [float(i) for i in range(51, 100)]
 BACK = [float(i) for i in range(50)] + [48.0] + [float(i) for i in range(51, 100)]
+ROTATION = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 MIRROR = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
 SECRET = "Zyxw-very-private"
 
@@ -28,9 +29,9 @@ def samples(count: int) -> dict[str, Any]:
     return {"linear_acceleration": signal("g", (50, 10, 10), rate=20_000, samples=count)}
 
 
-def mounted(rotation: list[list[float]]) -> dict[str, Any]:
-    mounting = {"accelerometer": {"rotation": rotation, "offset_mm": [0.0, 0.0, 0.0]}}
-    return kinematics(location="sensor", mounting=mounting)
+def mounted(rotation: list[list[float]], offset_mm: float = 0.0, scale: float = 1.0) -> dict[str, Any]:
+    mounting = {"accelerometer": {"rotation": rotation, "offset_mm": [offset_mm, 0.0, 0.0]}}
+    return kinematics(scale, location="sensor", mounting=mounting)
 
 
 # name -> (body, problem, pointer of the first error)
@@ -65,6 +66,21 @@ BODIES: dict[str, tuple[dict[str, Any], str, str]] = {
         impact_body(kinematics=mounted(MIRROR)),
         "improper-rotation",
         "/kinematics/mounting/accelerometer/rotation",
+    ),
+    "an offset of a kilometre": (
+        impact_body(kinematics=mounted(ROTATION, 1e6)),
+        "invalid-payload",
+        "/kinematics/mounting/accelerometer/offset_mm/0",
+    ),
+    "an offset beyond every number": (
+        impact_body(kinematics=mounted(ROTATION, -1e308)),
+        "invalid-payload",
+        "/kinematics/mounting/accelerometer/offset_mm/0",
+    ),
+    "an offset that makes more than 1000 g": (
+        impact_body(kinematics=mounted(ROTATION, 1000.0, 3.0)),
+        "invalid-trace",
+        LINEAR,
     ),
     "a sensor without a mounting": (
         impact_body(kinematics=kinematics(location="sensor")),

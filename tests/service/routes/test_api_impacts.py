@@ -36,6 +36,23 @@ class TestSend:
         assert again.json() == first.json()
         assert len(api.get("/v1/impacts").json()["data"]) == 1
 
+    def test_the_same_athlete_by_another_name_is_the_same_content(self, api: Api) -> None:
+        first = api.create("e-1")
+        by_id = {"id": first["athlete"]["id"]}
+        renamed = {"external_id": "p-18"}
+        assert api.post("/v1/impacts", json=impact_body("e-1", athlete=renamed)).status_code == 409
+        assert api.post("/v1/impacts", json=impact_body("e-1", athlete=by_id)).json() == first
+        sent = api.patch(f"/v1/athletes/{by_id['id']}", json=renamed, headers={"If-Match": "*"})
+        assert sent.status_code == 200
+        for athlete in (renamed, by_id, {"external_id": "p-17"}):
+            again = api.post("/v1/impacts", json=impact_body("e-1", athlete=athlete))
+            assert (again.status_code, again.json()["id"]) == (200, first["id"]), athlete
+            other = api.post("/v1/impacts", json=impact_body("e-1", athlete=athlete, scale=1.1))
+            assert other.status_code == 409
+        for change in ({"occurred_at": None}, {"device": {"serial": "d-9"}}, {"context": {"activity": "game"}}):
+            assert api.post("/v1/impacts", json=impact_body("e-1", athlete=by_id, **change)).status_code == 409
+        assert [row["external_id"] for row in api.get("/v1/athletes").json()["data"]] == ["p-18"]
+
     def test_other_content_under_the_same_name_is_409(self, api: Api) -> None:
         api.create("e-1")
         answer = api.post("/v1/impacts", json=impact_body("e-1", scale=1.1))
@@ -142,6 +159,14 @@ class TestCorrect:
         assert answer.json()["athlete"]["external_id"] == "p-18"
         assert answer.json()["score"]["criteria"] != impact["score"]["criteria"]
         assert [score["revision"] for score in api.get(f"{address}/scores").json()["data"]] == [1, 2]
+
+    def test_a_correction_that_is_sent_again_is_answered_as_it_asks(self, api: Api) -> None:
+        address = f"/v1/impacts/{api.create('e-1')['id']}"
+        better = impact_body("e-1", scale=1.2, include=["traces"])
+        first, again = (api.put(address, json=better, headers={"If-Match": "*"}) for _ in range(2))
+        assert (first.headers["etag"], again.headers["etag"]) == ('"2"', '"2"')
+        assert again.json() == first.json()
+        assert again.json()["score"]["traces"]["brain_angle"]
 
     def test_a_redelivery_of_any_kept_revision_is_200(self, api: Api) -> None:
         impact = api.create("e-1")

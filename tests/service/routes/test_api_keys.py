@@ -103,6 +103,23 @@ class TestSettings:
         exceeded = [point["exceeded"] for point in before["operating_points"]]
         assert [point["exceeded"] for point in after["operating_points"]] == exceeded
 
+    @pytest.mark.parametrize("incidence", [0.0, 1e-320, 9e-10, 1.0 - 9e-10, 1.0, -0.1])
+    def test_an_incidence_at_which_probabilities_would_be_0_or_1_is_422(self, api: Api, incidence: float) -> None:
+        answer = api.patch("/v1/settings", json={"incidence": incidence})
+        assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/incidence")
+        assert api.get("/v1/settings").json()["incidence"] == 0.0055
+
+    @pytest.mark.parametrize("incidence", [1e-9, 1.0 - 1e-9])
+    @pytest.mark.parametrize("scale", [0.1, 1.0, 3.0, 10.0])
+    def test_at_the_last_incidences_the_same_thresholds_are_exceeded(
+        self, api: Api, incidence: float, scale: float
+    ) -> None:
+        before = api.post("/v1/score", json=score_body(scale)).json()["operating_points"]
+        assert api.patch("/v1/settings", json={"incidence": incidence}).status_code == 200
+        after = api.post("/v1/score", json=score_body(scale)).json()["operating_points"]
+        assert [point["exceeded"] for point in after] == [point["exceeded"] for point in before]
+        assert all(0.0 < point["threshold"] < 1.0 for point in after)
+
     def test_operating_points_of_the_organisation_are_answered_by_default(self, api: Api) -> None:
         points = [{"criterion": "hic15", "threshold": 0.01}]
         assert api.patch("/v1/settings", json={"operating_points": points}).json()["operating_points"] == points
