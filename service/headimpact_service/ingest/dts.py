@@ -43,6 +43,8 @@ _KEYS = {
     "filter": ("softwarefilter",),
     "name": ("channeldescription", "channelname", "description", "location"),
     "before": ("prezero", "numberofprezero", "pretriggerp"),
+    "after": ("postzero", "numberofpostzero", "posttriggerp"),
+    "points": ("numberofpts", "numberofpoints", "totalpts", "totalpoints"),
 }
 _NUMBER = re.compile(NUMBER, re.ASCII)
 
@@ -192,7 +194,17 @@ class _Data:
         code = head_code(self.header.of_channel("code", index)) if "code" in self.header.fields else None
         if code is None:
             return None
-        return HeadChannel(code, self.named(index), partial(self._curve, code, index), self._filtering(index, code))
+        read = partial(self._curve, code, index)
+        return HeadChannel(code, self.named(index), read, self._filtering(index, code), points=self._points(index))
+
+    def _points(self, index: int) -> float | None:
+        """How many samples the header says that a channel has: in all, or before and after the trigger."""
+        said = [self.header.of_channel(key, index) for key in ("points", "before", "after")]
+        points, before, after = (float(cell) if _NUMBER.fullmatch(cell) else None for cell in said)
+        if points is not None or before is None or after is None:
+            return points
+        # some count the trigger's own sample with those after it, some with neither
+        return before + after + (len(self.rows) == before + after + 1)
 
     def named(self, index: int) -> str:
         """The channel as messages name it."""

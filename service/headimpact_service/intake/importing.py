@@ -126,7 +126,7 @@ def _preview(scored: Scored) -> dict[str, Any]:
         "kinematics": kinematics_document(describe(record)),
         "as_sent": {name: _as_sent(signal) for name, signal in record.recording.signals()},
         "source": dict(record.metadata),
-        "state": document["state"],
+        **{name: document[name] for name in ("state", "reasons") if name in document},
         "peaks": document["peaks"],
         "quality": document["quality"],
     }

@@ -35,6 +35,7 @@ class PreviewView(BaseModel):
     as_sent: dict[str, AsSentView]
     source: dict[str, Any]
     state: Literal["scored", "unscorable"]
+    reasons: list[str] | None = Field(None, description="Why it must not be scored; absent where it is.")
     peaks: PeaksView
     quality: list[QualityView]
 

@@ -71,6 +71,23 @@ def test_two_heads_of_one_file_are_two_impacts():
     assert peaks(second, "linear_acceleration")[0] == 60.0
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, None),
+        ({"Number of Pts (Total)": [4000] * 6}, 4000),
+        ({"Number of Pts (Total)": [], "Post-zero Data Pts": [SAMPLES - 10] * 6}, None),
+        ({"Number of Pts (Total)": [], "Post-zero Data Pts": [SAMPLES - 11] * 6}, None),
+        ({"Number of Pts (Total)": [], "Post-zero Data Pts": [3000] * 6}, 3010),
+        ({"Number of Pts (Total)": ["many"] * 6}, None),
+    ],
+)
+def test_a_file_that_has_fewer_samples_than_its_header_says_is_noted(changes, said):
+    notes = [note for note in one(dts(changes=changes)).notes if note.code == "sample_count_mismatch"]
+    assert len(notes) == (0 if said is None else 6)
+    assert all(f"{SAMPLES} samples where its header says {said}" in note.detail for note in notes)
+
+
 def test_other_channels_of_the_file_are_passed_over():
     columns = {"11CHST0000H3ACXC": ("g", 99.0), **DTS_COLUMNS, "": ("V", 1.0)}
     assert peaks(one(dts(columns)), "linear_acceleration")[0] == 30.0

@@ -82,7 +82,13 @@ class TestImport:
         assert preview["peaks"]["linear_acceleration_g"] > 40
         assert preview["quality"] == []
         assert api.get("/v1/impacts").json()["data"] == []
+        assert "reasons" not in preview
         assert api.get("/v1/athletes").json()["data"] == []
+
+    def test_a_dry_run_says_why_an_impact_would_not_be_scored(self, api: Api) -> None:
+        body = json.dumps(impact_body("e-1", unscorable=["The laboratory withdrew it."])).encode()
+        preview = upload(api, body, "application/json", dry_run="true").json()["data"][0]["preview"]
+        assert (preview["state"], preview["reasons"]) == ("unscorable", ["The laboratory withdrew it."])
 
     def test_a_gzip_upload_is_inflated(self, api: Api) -> None:
         headers = {"Content-Type": "text/csv", "Content-Encoding": "gzip"}
