@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from headimpact_service.cli.database import migrated
 from headimpact_service.cli.faults import USAGE, problem_line
-from headimpact_service.cli.files import files_of
+from headimpact_service.cli.files import files_of, texts_beside
 from headimpact_service.cli.score import with_mapping
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
@@ -54,6 +54,8 @@ def run(
     if not files:
         raise ValueError("There is no file to import in these paths.")
     console = Console(highlight=False, soft_wrap=True)
+    for text in (text for path in paths for text in texts_beside(path)):
+        console.print(f"{text}: passed over, a text beside the recordings", markup=False)
     failed = 0
     with migrated(database_url) as database, _progress(console) as progress:
         target = _target(database, organisation, mode)

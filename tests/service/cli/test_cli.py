@@ -199,6 +199,21 @@ class TestImport:
         assert code == 2
         assert [line.split(": ")[1] for line in printed.splitlines()] == ["1 created", "refused"]
 
+    def test_texts_beside_the_recordings_of_a_folder_are_passed_over(self, run: Run, tmp_path: Path) -> None:
+        folder = tmp_path / "files"
+        (folder / "more").mkdir(parents=True)
+        (folder / "a.json").write_text(json.dumps(impact_body("a")))
+        for name in ("README.md", "camlab_LICENSE", "more/notes.pdf"):
+            (folder / name).write_text("for people")
+        database = f"sqlite:///{tmp_path / 'x.db'}"
+        code, printed, _ = run("import", str(folder), "--database-url", database)
+        assert code == 0
+        said = {line.rsplit("/", 1)[-1] for line in printed.splitlines()}
+        over = "passed over, a text beside the recordings"
+        assert said == {f"README.md: {over}", f"camlab_LICENSE: {over}", f"notes.pdf: {over}", "a.json: 1 created"}
+        code, printed, _ = run("import", str(folder / "README.md"), "--database-url", database)
+        assert (code, "refused" in printed) == (2, True)  # who names it means it
+
     def test_a_dry_run_stores_nothing(self, run: Run, tmp_path: Path) -> None:
         file = tmp_path / "a.json"
         file.write_text(json.dumps(impact_body("a")))

@@ -92,6 +92,43 @@ def test_elements_of_a_struct_may_differ_in_length():
     assert [record.recording.signals()[0][1].values.shape[0] for record in found] == [100, 60]
 
 
+def test_the_impacts_may_stand_within_a_struct_of_their_session():
+    values = noise(3, 100)
+    session = structs({"day": "2026-11-20", "impact": impacts(values), "rate": np.array([[1000.0]])})
+    for held in (session, structs({"session": session, "other": np.zeros((2, 2))})):
+        found = records(mat({"data": held}), preset=PRESET)
+        np.testing.assert_array_equal(np.stack([samples_of(record)[:, :6] for record in found]), values)
+
+
+def test_an_impacts_samples_may_stand_in_structs_within_it():
+    values = noise(2, 100)
+    nested = structs(
+        *(
+            {
+                "label": f"hit {number}",
+                "signals": structs({"acc": structs({"raw": sent[:, :3]}), "gyro": sent[:, 3:]}),
+            }
+            for number, sent in enumerate(values)
+        )
+    )
+    mapping = {
+        "linear_acceleration": {"unit": "g"} | {axis: f"signals_acc_raw_{axis}" for axis in "xyz"},
+        "angular_velocity": {"unit": "rad/s"} | {axis: f"signals_gyro_{axis}" for axis in "xyz"},
+        "external_id": "label",
+        "sample_rate_hz": 1000,
+    }
+    found = records(mat({"impact": nested}), mapping=Mapping.model_validate(mapping))
+    np.testing.assert_array_equal(np.stack([samples_of(record) for record in found]), values)
+    assert [record.external_id for record in found] == ["hit 0", "hit 1"]
+
+
+def test_structs_within_structs_without_end_are_read_no_further():
+    deep = structs({"acc": np.zeros((5, 3))})
+    for _ in range(30):
+        deep = structs({"s": deep})
+    assert refused(mat({"impact": deep}), preset=PRESET).slug == "unreadable-file"
+
+
 def test_fields_of_one_element_may_differ_in_length():
     [[element]] = impacts(noise(1, 100))
     element["ang_acc"] = element["ang_acc"][:80]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import zlib
 from collections.abc import Iterator, Sequence
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeGuard
 
 import numpy as np
 from scipy.io import loadmat, savemat
@@ -27,6 +27,8 @@ MAX_INFLATED = 32 * 1024 * 1024
 MAX_ELEMENTS = 10_000
 MAX_FIELDS = 100
 MAX_WIDTH = 64
+MAX_DEPTH = 8
+"""Of structs within structs."""
 ALONE = "array"
 """The other name of an array that is the only one."""
 _HEADER = 128
@@ -49,7 +51,7 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
     structs = [value for value in variables.values() if isinstance(value, np.ndarray) and value.dtype.names]
     if structs:
         for struct in structs:
-            yield NamedTable(None, StructTable(struct.reshape(-1)))
+            yield NamedTable(None, StructTable([_flat(element) for element in _elements(struct)]))
         return
     yield NamedTable(None, _arrays(variables))
 
@@ -120,6 +122,36 @@ def _arrays(variables: dict[str, Any]) -> ArrayTable:
     return ArrayTable(samples, facts, {})
 
 
+def _elements(struct: AnyArray) -> AnyArray:
+    """The impacts of a struct array, which may be the only one of many elements within a struct of a session."""
+    many = _of_many(struct)
+    return (many[0] if len(many) == 1 else struct).reshape(-1)
+
+
+def _of_many(struct: AnyArray, depth: int = 0) -> list[AnyArray]:
+    if struct.size != 1 or depth == MAX_DEPTH:
+        return [struct] if struct.size > 1 else []
+    fields = struct.reshape(-1)[0]
+    inner = [fields[name] for name in fields.dtype.names if _is_struct(fields[name])]
+    return [many for one in inner for many in _of_many(one, depth + 1)]
+
+
+def _flat(record: Any, before: str = "", depth: int = 0) -> dict[str, Any]:  # noqa: ANN401 - a record of a struct array
+    """The fields of one impact; of a struct within it, `data.acc` is called `data_acc`."""
+    fields: dict[str, Any] = {}
+    for name in record.dtype.names:
+        value = record[name]
+        if _is_struct(value) and value.size == 1 and depth < MAX_DEPTH:
+            fields |= _flat(value.reshape(-1)[0], f"{before}{name}_", depth + 1)
+        else:
+            fields[before + name] = value
+    return fields
+
+
+def _is_struct(value: Any) -> bool:  # noqa: ANN401 - whatever a file holds
+    return isinstance(value, np.ndarray) and value.dtype.names is not None
+
+
 def _numeric(variables: dict[str, Any], dimensions: int) -> dict[str, AnyArray]:
     return {
         name: value
@@ -171,10 +203,10 @@ class StructTable:
     parted = True
     units: dict[int, str] = {}  # noqa: RUF012 - a MATLAB file says none
 
-    def __init__(self, impacts: AnyArray) -> None:
+    def __init__(self, impacts: Sequence[dict[str, Any]]) -> None:
         """Look at every field once."""
         self._impacts = impacts
-        names = impacts.dtype.names or ()
+        names = list(dict.fromkeys(name for impact in impacts for name in impact))
         if len(names) > MAX_FIELDS:
             raise unreadable(f"A struct may have at most {MAX_FIELDS} fields.")
         self._columns: list[tuple[str, int | None]] = []
@@ -191,7 +223,7 @@ class StructTable:
         for impact in self._impacts:
             samples = {place: self._column(impact, place) for place in numbers}
             length = min(max((values.size for values in samples.values()), default=0), MAX_LENGTH)
-            held.append((samples, {place: _text(impact[self._columns[place][0]]) for place in texts}, length))
+            held.append((samples, {place: _text(impact.get(self._columns[place][0])) for place in texts}, length))
             if sum(rows for _, _, rows in held) >= ROWS_AT_ONCE:
                 yield _joined(held, numbers, texts)
                 held = []
@@ -200,7 +232,7 @@ class StructTable:
 
     def _headings_of(self, name: str) -> list[tuple[str, int | None]]:
         """A field's headings: of three components one each, of times also that with the unit that makes 1 kHz."""
-        cells = [value for value in self._impacts[name] if _is_numeric(value)]
+        cells = [value for impact in self._impacts if _is_numeric(value := impact.get(name))]
         if cells and all(_by_samples(value).shape[1] == 3 for value in cells):
             return [(f"{name}_{axis}", part) for part, axis in enumerate(AXES)]
         if not cells or any(_by_samples(value).shape[1] != 1 for value in cells):
@@ -208,15 +240,15 @@ class StructTable:
         called = [heading for heading, step in _STEPS if name == _TIME and all(_steps_by(v, step) for v in cells)]
         return [(heading, 0) for heading in (name, *called)]
 
-    def _column(self, impact: Any, place: int) -> FloatArray:  # noqa: ANN401 - a record of the struct array
+    def _column(self, impact: dict[str, Any], place: int) -> FloatArray:
         name, part = self._columns[place]
-        value = impact[name]
+        value: Any = impact.get(name)
         if part is None or not _is_numeric(value):
             raise unreadable(f"The field {name} of the struct holds no column of numbers.")
         return _by_samples(value)[:, part].astype(np.float64)
 
 
-def _is_numeric(value: Any) -> bool:  # noqa: ANN401 - whatever a file holds
+def _is_numeric(value: Any) -> TypeGuard[AnyArray]:  # noqa: ANN401 - whatever a file holds
     return isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.ndim == 2
 
 
