@@ -12,7 +12,8 @@ from headimpact_service.ingest.record import ImpactRecord
 
 def with_options(record: ImpactRecord, options: ImportOptions) -> ImpactRecord:
     """The record as the sender's fields have it."""
-    changes: dict[str, Any] = {"recording": _recording(record.recording, options)}
+    recording = _recording(record.recording, options)
+    changes: dict[str, Any] = {} if recording is record.recording else {"recording": recording}
     if options.athlete is not None:
         changes |= {"athlete_id": None, "athlete_external_id": options.athlete}
     if options.device is not None:
@@ -21,7 +22,7 @@ def with_options(record: ImpactRecord, options: ImportOptions) -> ImpactRecord:
         changes["occurred_at"] = options.occurred_at
     if options.filename is not None:
         changes["metadata"] = {**record.metadata, "file": options.filename}
-    return replace(record, **changes)
+    return replace(record, **changes) if changes else record
 
 
 def _recording(recording: Recording, options: ImportOptions) -> Recording:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -23,14 +23,21 @@ def find(conn: Any, data_set_id: bytes, serial: str | None, athlete_id: str | No
     return _device_in(conn, data_set_id, serial), _athlete_in(conn, data_set_id, athlete_id, external_id)
 
 
-def facts_in(conn: Any, data_set_id: bytes) -> Callable[[ImpactRecord], tuple[ImpactRecord, DeviceFacts]]:  # noqa: ANN401 - a connection of the store
-    """The same for the records of one file: each device and athlete is looked up once."""
-    device_of = cache(partial(_device_in, conn, data_set_id))
-    athlete_of = cache(partial(_athlete_in, conn, data_set_id))
+def facts_of(
+    conn: Any,  # noqa: ANN401 - a connection of the store
+    data_set_id: bytes,
+    records: Sequence[ImpactRecord],
+) -> Callable[[ImpactRecord], tuple[ImpactRecord, DeviceFacts]]:
+    """The same for some records: their devices and athletes are looked up together."""
+    serials = {record.device_serial for record in records if record.device_serial is not None}
+    names = {record.athlete_external_id for record in records if record.athlete_external_id is not None}
+    known = {serial: _device(device) for serial, device in devices.get_many(conn, data_set_id, serials).items()}
+    named = athletes.find_many(conn, data_set_id, names)
+    by_id = cache(partial(_athlete_in, conn, data_set_id, external_id=None))
 
     def look_up(record: ImpactRecord) -> tuple[ImpactRecord, DeviceFacts]:
-        athlete = athlete_of(record.athlete_id, record.athlete_external_id)
-        return with_population_note(record, athlete), device_of(record.device_serial)
+        athlete = named.get(record.athlete_external_id or "") if record.athlete_id is None else by_id(record.athlete_id)
+        return with_population_note(record, athlete), known.get(record.device_serial or "", UNKNOWN_DEVICE)
 
     return look_up
 

@@ -15,7 +15,7 @@ from headimpact.recording import AXES, FloatArray, Signal
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.digest import content_digest
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
-from headimpact_service.intake.facts import facts_in
+from headimpact_service.intake.facts import facts_of
 from headimpact_service.intake.records import describe, kinematics_document
 from headimpact_service.intake.rendering import new_score, score_document
 from headimpact_service.intake.scoring import DeviceFacts, Scored, Terms, score_records
@@ -50,7 +50,7 @@ class Ready:
 
 def look_up(conn: Any, data_set_id: bytes, found: Found) -> Known:  # noqa: ANN401 - a connection of the store
     """What the devices and athletes of the records add to them."""
-    facts = facts_in(conn, data_set_id)
+    facts = facts_of(conn, data_set_id, [record for record in found if not isinstance(record, Problem)])
     return [None if isinstance(record, Problem) else facts(record) for record in found]
 
 

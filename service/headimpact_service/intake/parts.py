@@ -7,8 +7,8 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-MAX_VALUES = 120_000
-"""Samples of all channels of a part: two hundred ordinary impacts, one of the longest; 1 MB as they are sent."""
+MAX_VALUES = 153_600
+"""Samples of all channels of a part: 256 ordinary impacts, one of the longest; 1.2 MB as they are sent."""
 
 
 def parts(items: Iterable[T], values_of: Callable[[T], int], most: int) -> Iterator[list[T]]:

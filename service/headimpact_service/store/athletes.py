@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any, Literal
@@ -13,6 +13,7 @@ from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import erasure, ids
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
+from headimpact_service.store.many import in_parts
 from headimpact_service.store.paging import Page, Position, keyset, page_of
 from headimpact_service.store.revision import require_revision
 from headimpact_service.store.tables import athletes, diagnoses, impact_revisions, impacts
@@ -81,6 +82,7 @@ _MOVE_IMPACT = (
     .values(athlete_id=bindparam("target"))
 )
 _BY_EXTERNAL_ID = _ATHLETE.where(athletes.c.external_id == bindparam("external_id"))
+_BY_EXTERNAL_IDS = _ATHLETE.where(athletes.c.external_id.in_(bindparam("asked", expanding=True)))
 
 
 def create(conn: Connection, data_set_id: bytes, new: AthleteFields) -> Athlete:
@@ -103,6 +105,15 @@ def find(conn: Connection, data_set_id: bytes, external_id: str) -> Athlete | No
     query = {"data_set_id": data_set_id, "external_id": external_id}
     row = conn.execute(_BY_EXTERNAL_ID, query).mappings().first()
     return None if row is None else _athlete(row)
+
+
+def find_many(conn: Connection, data_set_id: bytes, external_ids: Iterable[str]) -> dict[str, Athlete]:
+    """The athletes of external ids, as far as they are known."""
+    found: dict[str, Athlete] = {}
+    for asked in in_parts(external_ids):
+        rows = conn.execute(_BY_EXTERNAL_IDS, {"data_set_id": data_set_id, "asked": asked}).mappings()
+        found |= {row["external_id"]: _athlete(row) for row in rows}
+    return found
 
 
 def ensure(conn: Connection, data_set_id: bytes, external_id: str) -> bytes:

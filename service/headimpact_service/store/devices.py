@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from typing import Any
@@ -11,6 +11,7 @@ from sqlalchemy import Connection, RowMapping, bindparam, insert, select, update
 
 from headimpact_service.store import ids
 from headimpact_service.store.clock import next_change
+from headimpact_service.store.many import in_parts
 from headimpact_service.store.paging import Page, Position, keyset, page_of
 from headimpact_service.store.revision import require_revision
 from headimpact_service.store.tables import devices
@@ -44,6 +45,7 @@ class Device(DeviceFields):
 _COLUMNS = [column for column in devices.c if column.name != "data_set_id"]
 _DEVICE = select(*_COLUMNS).where(devices.c.data_set_id == bindparam("data_set_id"))
 _BY_SERIAL = _DEVICE.where(devices.c.serial == bindparam("serial"))
+_BY_SERIALS = _DEVICE.where(devices.c.serial.in_(bindparam("asked", expanding=True)))
 _UPDATE = update(devices).where(devices.c.id == bindparam("device_id"))
 
 
@@ -51,6 +53,15 @@ def get(conn: Connection, data_set_id: bytes, serial: str) -> Device | None:
     """The device of a serial."""
     row = conn.execute(_BY_SERIAL, {"data_set_id": data_set_id, "serial": serial}).mappings().first()
     return None if row is None else _device(row)
+
+
+def get_many(conn: Connection, data_set_id: bytes, serials: Iterable[str]) -> dict[str, Device]:
+    """The devices of serials, as far as they are known."""
+    found: dict[str, Device] = {}
+    for asked in in_parts(serials):
+        rows = conn.execute(_BY_SERIALS, {"data_set_id": data_set_id, "asked": asked}).mappings()
+        found |= {row["serial"]: _device(row) for row in rows}
+    return found
 
 
 def put(

@@ -21,6 +21,7 @@ from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.impact_inserts import first_row, insert_rows
 from headimpact_service.store.impact_rows import NewImpact, external_id_digest
+from headimpact_service.store.many import ASKED_AT_ONCE, in_parts
 from headimpact_service.store.tables import athletes, devices, impacts
 
 T = TypeVar("T")
@@ -35,7 +36,6 @@ class Added:
     external_id: str | None
 
 
-_ASKED_AT_ONCE = 500
 _DATA_SET_PARAMETER: BindParameter[bytes] = bindparam("data_set_id")
 _ASKED: BindParameter[Any] = bindparam("asked", expanding=True)
 _NAMES, _CONTENTS = (
@@ -87,18 +87,11 @@ def _known(conn: Connection, data_set_id: bytes, query: Select[Any], digests: Se
     """Those of the digests that are stored, and those that occur twice."""
     counted = Counter(digest for digest in digests if digest is not None)
     known = {digest for digest, times in counted.items() if times > 1}
-    most = 2 * _ASKED_AT_ONCE  # of a content that is stored many times a few rows are as good as all
-    for asked in _in_parts(counted):
+    most = 2 * ASKED_AT_ONCE  # of a content that is stored many times a few rows are as good as all
+    for asked in in_parts(counted):
         found = conn.execute(query, {"data_set_id": data_set_id, "asked": asked, "most": most}).scalars().all()
         known.update(found if len(found) < most else asked)
     return known
-
-
-def _in_parts(values: Iterable[T]) -> Iterator[list[T]]:
-    """As many values as one query may ask for."""
-    every = list(values)
-    for first in range(0, len(every), _ASKED_AT_ONCE):
-        yield every[first : first + _ASKED_AT_ONCE]
 
 
 def _insert_new(conn: Connection, data_set_id: bytes, news: Sequence[NewImpact]) -> Iterator[Added]:
@@ -126,7 +119,7 @@ def _ids(
     """The ids behind names, made where they are new."""
     asked = list(dict.fromkeys(name for name in names if name is not None))
     found: dict[str | None, bytes] = {}
-    for part in _in_parts(asked):
+    for part in in_parts(asked):
         rows = conn.execute(query, {"data_set_id": data_set_id, "asked": part})
         found.update((name, known) for name, known in rows)
     return {name: found.get(name) or ensure(conn, data_set_id, name) for name in asked}

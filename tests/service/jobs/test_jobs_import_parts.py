@@ -29,7 +29,7 @@ def test_parts_hold_everything_in_order_within_their_bounds(sizes: list[int], mo
 def test_no_part_is_smaller_than_it_must_be() -> None:
     short = [600] * 450
     assert [len(part) for part in parts(short, lambda size: size, 200)] == [200, 200, 50]
-    assert [len(part) for part in parts([60_000] * 7, lambda size: size, 200)] == [2, 2, 2, 1]
+    assert [len(part) for part in parts([75_000] * 7, lambda size: size, 200)] == [2, 2, 2, 1]
 
 
 def long_records(path: Path, count: int, samples: int) -> None:
