@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from headimpact_service.errors import Problem
-from headimpact_service.store import athletes, impact_batches, impacts, organisations
+from headimpact_service.store import athletes, impact_batches, impacts, many, organisations
 from headimpact_service.store.athletes import AthleteFields
 from headimpact_service.store.database import Database
 from headimpact_service.store.impact_batches import Added, add_many
@@ -124,7 +124,8 @@ def test_what_is_stored_together_changes_at_instants_of_its_own(
 def test_a_content_that_is_stored_often_hides_no_other(
     database: Database, data_set: bytes, make_impact: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(impact_batches, "_ASKED_AT_ONCE", 3)
+    for module in (impact_batches, many):
+        monkeypatch.setattr(module, "ASKED_AT_ONCE", 3)
     for number in range(8):
         database.write(lambda conn, n=number: impacts.add(conn, data_set, make_impact("often", external_id=f"o-{n}")))
     first = database.write(lambda conn: impacts.add(conn, data_set, make_impact("rare", external_id="r"))).impact
