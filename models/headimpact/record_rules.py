@@ -16,6 +16,7 @@ from headimpact.kinematics import FloatArray
 from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import AXES, words
 from headimpact.recording import TO_CRITERIA_UNIT, Recording, Signal, SignalName
+from headimpact.stamps import rate_said
 
 UNITS_OF: dict[str, tuple[str, str]] = {
     "linear_acceleration": ("g", "m/s^2"),
@@ -100,7 +101,7 @@ def rate_of(name: SignalName, time_s: FloatArray) -> float:
     """Samples per second of stamps that increase, each step within 15 % of the median one [Hz]."""
     for fault in _faults_of_stamps(name, time_s):
         raise fault
-    return float((time_s.size - 1) / (time_s[-1] - time_s[0]))
+    return rate_said(time_s)
 
 
 def _faults_of_stamps(name: SignalName, time_s: FloatArray) -> Iterator[TraceError]:
@@ -158,9 +159,17 @@ def broken_rules(recording: Recording) -> Iterator[TraceError]:
             yield fault
             continue
         whole = fill_gaps(signal)[0] if recording.fill_gaps else signal
-        yield from _missing(name, whole.values)
-        yield from _beyond(name, whole.values * TO_CRITERIA_UNIT[whole.unit])
+        for found in (*_missing(name, whole.values), *_beyond(name, whole.values * TO_CRITERIA_UNIT[whole.unit])):
+            yield _at_sent_sample(found, signal, whole)
         yield from _faults_of_times(name, whole)
+
+
+def _at_sent_sample(fault: TraceError, sent: Signal, whole: Signal) -> TraceError:
+    """The fault at the sample that was sent, where filled ones stand before it."""
+    if fault.index is None or sent.time_s is None or whole.time_s is None or whole.time_s.size == sent.time_s.size:
+        return fault
+    index = min(int(np.searchsorted(sent.time_s, whole.time_s[fault.index])), sent.time_s.size - 1)
+    return TraceError(fault.code, str(fault), signal=fault.signal, channel=fault.channel, index=index)
 
 
 def _faults_of_times(name: SignalName, signal: Signal) -> Iterator[TraceError]:

@@ -53,7 +53,7 @@ def common_time_base(tracks: Mapping[SignalName, Track]) -> TimeBase:
     TraceError
         ``no-overlap``: the signals have fewer than 3 samples in common.
     """
-    base = max(tracks.values(), key=lambda track: track.rate_hz)
+    base = _fastest(tracks)
     start = max(track.start_s for track in tracks.values())
     stop = min(track.start_s + (track.samples - 1) / track.rate_hz for track in tracks.values())
     # a thousandth of a step of slack, so that equal records do not lose a sample to rounding
@@ -65,6 +65,13 @@ def common_time_base(tracks: Mapping[SignalName, Track]) -> TimeBase:
     samples = last - first + 1
     keeps_all = all(way == slice(0, track.samples) for way, track in zip(ways.values(), tracks.values(), strict=True))
     return TimeBase(base.rate_hz, base.start_s + first / base.rate_hz, samples, ways, keeps_all)
+
+
+def _fastest(tracks: Mapping[SignalName, Track]) -> Track:
+    """The signal of the highest rate; of those of one rate the first, whatever their stamps' last digits make of it."""
+    highest = max(track.rate_hz for track in tracks.values())
+    least = highest * (1.0 - QUALITY_LIMITS["record"]["same_rate"])
+    return next(track for track in tracks.values() if track.rate_hz >= least)
 
 
 def _way(track: Track, base: Track, first: int, last: int) -> slice | Onto:

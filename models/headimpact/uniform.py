@@ -12,6 +12,7 @@ from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import QualityNote, words
 from headimpact.record_rules import rate_of, require_finite, require_form, require_rate, require_within
 from headimpact.recording import TO_CRITERIA_UNIT, FloatArray, Mounting, Recording, Signal, SignalName
+from headimpact.stamps import rounding_s
 from headimpact.time_base import Track
 
 Numbers = tuple[float, ...]
@@ -135,7 +136,7 @@ def _resampled(
 ) -> FloatArray:
     """Linear interpolation onto n equal steps from the first stamp to the last, where the stamps are not equal."""
     jitter = float(np.abs(np.diff(time_s) * rate - 1.0).max())
-    if jitter <= QUALITY_LIMITS["record"]["uniform_jitter"]:
+    if jitter <= QUALITY_LIMITS["record"]["uniform_jitter"] + rounding_s(time_s) * rate:
         return values
     detail = (
         f"The time stamps of the {words(name)} jitter by up to {jitter:.2%} of a step; it was resampled to "

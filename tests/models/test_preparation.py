@@ -156,6 +156,29 @@ def test_a_peak_where_another_signal_was_not_recorded_is_noted(at, noted, rate_h
     assert not noted or ("50" in notes[-1].detail and "30" in notes[-1].detail)
 
 
+@pytest.mark.parametrize("offset_ms", [0.0, 3.3, 12.418451, -20.5, 1.763665445123e12])
+@pytest.mark.parametrize("rate_hz", [500.0, 1000.0, 3200.0, 10_000.0])
+def test_the_clock_that_stamps_count_from_changes_nothing(offset_ms, rate_hz):
+    stamps = (offset_ms + np.arange(100) * 1000.0 / rate_hz) / 1000.0
+    found = prepare(Recording(Signal(A, "g", time_s=stamps), Signal(W, "rad/s", time_s=stamps)))
+    expected = prepare(Recording(Signal(A, "g", rate_hz), Signal(W, "rad/s", rate_hz)))
+    assert codes(found) == codes(expected)
+    assert found.kinematics.sample_rate_hz == rate_hz
+    assert (found.motion.stack == expected.motion.stack).all()
+
+
+def test_of_two_signals_of_one_rate_the_first_is_the_base_whatever_their_last_digits():
+    for offset in np.arange(200) / 10.0:
+        stamps = (offset + np.arange(100.0)) / 1000.0
+        late = stamps + 0.3e-3
+        found = prepare(Recording(Signal(A, "g", time_s=stamps), Signal(W, "rad/s", time_s=late), low_pass=NO_FILTER))
+        close(found.kinematics.linear_acceleration_g, A[1:])
+    slower = Signal(W, "rad/s", 1000.0 / 1.0009)
+    assert prepare(Recording(Signal(A, "g", 1000.0), slower)).kinematics.sample_rate_hz == 1000.0
+    faster = prepare(Recording(Signal(A, "g", 1000.0), Signal(W, "rad/s", 1002.0), low_pass=NO_FILTER)).kinematics
+    assert faster.sample_rate_hz == 1002.0
+
+
 def test_overlap_of_three_samples_is_enough():
     time_s = np.arange(100) / 1000.0
     found = prepare(Recording(Signal(A, "g", time_s=time_s), Signal(W, "rad/s", time_s=time_s + 0.097)))

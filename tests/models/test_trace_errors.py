@@ -11,6 +11,7 @@ from waveforms import burst, recording, rotation_matrix
 from headimpact.errors import HeadimpactError, TraceError
 from headimpact.filtering import NO_FILTER
 from headimpact.preparation import prepare
+from headimpact.record_rules import broken_rules
 from headimpact.recording import Mounting, Recording, Signal
 
 # A value that no message may repeat.
@@ -240,3 +241,12 @@ def test_an_offset_that_is_no_length_is_refused():
     with pytest.raises(TraceError) as raised:
         Mounting(np.eye(3), np.eye(3), np.array([0.0, np.nan, 0.0]))
     assert raised.value.code == "improper-offset"
+
+
+def test_a_missing_sample_is_named_where_it_was_sent_though_others_were_filled_in_before_it():
+    keep = np.setdiff1d(np.arange(100), [20, 21, 40])  # gaps that the stamps show and that are filled
+    values = recording().linear_acceleration.values[keep].copy()
+    values[80:84, 1] = np.nan  # too many to be filled
+    sent = Recording(Signal(values, "g", time_s=keep / 1000.0), fill_gaps=True)
+    faults = [(fault.code, fault.channel, fault.index) for fault in broken_rules(sent)]
+    assert faults == [("missing-sample", "y", index) for index in range(80, 84)]

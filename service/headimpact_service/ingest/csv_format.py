@@ -36,6 +36,7 @@ MAX_COLUMNS = 1024
 ROWS_AT_ONCE = 4096
 _SEPARATOR = re.compile(r"sep=.\s*", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*", re.ASCII)
+_NOTHING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
 Block = tuple[FloatArray, Sequence[Sequence[str]]]
 # float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
@@ -152,10 +153,10 @@ class CsvTable:
         return row[:width]
 
     def _number(self, cell: str) -> float:
-        """The number in a cell; NaN where there is none."""
+        """The number in a cell; NaN where there is none, infinite where something else stands."""
         comma = _NUMBER.fullmatch(cell) is None
         if comma and _DECIMAL_COMMA.fullmatch(cell) is None:
-            return float("nan")
+            return float("nan" if cell.strip().lower() in _NOTHING else "inf")
         if comma and not self._decimal_commas:
             return self._unclear(
                 "Whether commas in the file's numbers are decimal or group thousands is not clear: write them with a "

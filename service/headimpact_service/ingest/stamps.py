@@ -7,21 +7,16 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from headimpact.stamps import rate_said, rounding_s
+
 FloatArray = NDArray[np.float64]
 
 UNIFORM_JITTER = 1e-6
 """Of the step: stamps that stray less from a straight line are rounded, not jittered."""
 
-ROUND_RATE = 1e-9
-"""Relative: a rate this near to a whole number of hertz is that number, which its decimal stamps could not say."""
-
 
 def nominal_rate(stamps_s: FloatArray) -> float | None:
-    """The rate [Hz] of stamps [s] that are uniform to rounding; None where they are jittered or run backwards.
-
-    Stamps that are uniform say a rate, and a stated rate is what filters are designed from: 0.0003125 s steps mean
-    3200 Hz, not the 3200.0000000000005 Hz that the last stamp divided by its index gives.
-    """
+    """The rate [Hz] of stamps [s] that are uniform to rounding; None where they are jittered or run backwards."""
     count = stamps_s.shape[0]
     if count < 2:
         return None
@@ -30,16 +25,9 @@ def nominal_rate(stamps_s: FloatArray) -> float | None:
         return None
     step = span / (count - 1)
     strays = np.abs(stamps_s - (stamps_s[0] + step * np.arange(count)))
-    if not float(strays.max()) <= UNIFORM_JITTER * step:
+    if not float(strays.max()) <= UNIFORM_JITTER * step + rounding_s(stamps_s):
         return None
-    return _rounded((count - 1) / span)
-
-
-def _rounded(rate: float) -> float:
-    if not rate < 1e15:
-        return rate
-    whole = float(round(rate))
-    return whole if abs(rate - whole) <= ROUND_RATE * rate else rate
+    return rate_said(stamps_s)
 
 
 def before_zero_ms(spans: Iterable[tuple[float, float]]) -> float | None:

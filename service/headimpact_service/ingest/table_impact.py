@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -66,7 +66,7 @@ class Samples:
         self.layout, self.window, self.texts, self.numbers = layout, window, columns.texts, columns.numbers
         self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
         self._changes = self._changed(layout)
-        self._finite = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
+        self.is_whole = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
 
     def _changed(self, layout: Layout) -> NDArray[np.intp] | None:
         """How often what rows say of their impact has changed, row by row; None where nothing is said in rows."""
@@ -84,11 +84,11 @@ class Samples:
     @property
     def has_ends(self) -> bool:
         """Whether a signal may end before its impact does: arrays and lists of unlike lengths."""
-        return self.window.columns.lengths is not None and not self._finite
+        return self.window.columns.lengths is not None and not self.is_whole
 
     def require_finite(self, columns: list[int], rows: Rows, first: int) -> None:
         """Refuse rows in which a cell is not a finite number."""
-        if self._finite:
+        if self.is_whole:
             return
         for column in columns:
             faulty = np.flatnonzero(~np.isfinite(self.numbers[column][rows]))
@@ -152,14 +152,17 @@ class TableImpact:
 
     @cached_property
     def reading(self) -> Reading:
-        """What the impact's first row says of how to read it."""
-        return self._reading_at(self.cell)
+        """What the impact's rows say of how to read it."""
+        return self._reading((field, self._said(column)) for field, column in self.layout.reading.items())
 
     def _reading_at(self, cell: int) -> Reading:
-        columns = self.layout.reading
-        if not columns:
+        """The same of one part of an impact."""
+        columns = self.layout.reading.items()
+        return self._reading((field, self.samples.texts[column][cell].strip()) for field, column in columns)
+
+    def _reading(self, cells: Iterable[tuple[str, str]]) -> Reading:
+        if not self.layout.reading:
             return NOTHING_SAID
-        cells = ((field, self.samples.texts[column][cell].strip()) for field, column in columns.items())
         return reading_of(tuple((field, text) for field, text in cells if text))
 
     def _recording(self, *, scorable: bool) -> Recording:
@@ -212,9 +215,9 @@ class TableImpact:
         return tracks
 
     def _present(self) -> list[SignalName]:
-        """The signals of the impact: where the format parts impacts, one without any sample is not there."""
+        """The signals of the impact: one without any sample is not there."""
         signals = self.samples.signals
-        if not self.samples.has_ends:
+        if self.samples.is_whole:
             return list(signals)
         return [name for name, values in signals.items() if not np.isnan(values[self.rows]).all()] or list(signals)
 
@@ -361,12 +364,18 @@ class TableImpact:
     def _require_one_impact(self) -> None:
         """Refuse rows that say different things of their impact: they are several, and nothing tells them apart."""
         for column in self.layout.labels:
-            cells = self._distinct(column)
-            if len(cells) > 1 and (len(cells) > 2 or cells[0] == "" or "" not in cells):
+            if len([cell for cell in self._distinct(column) if cell]) > 1:
                 raise self._several(f"Column {column + 1} does not say the same")
         columns = [] if self.options.occurred_at is not None else self.layout.occurred_at
         if any(len(self._distinct(column)) > 1 for column in columns):
             self._require_one_time(columns)
+
+    def _said(self, column: int) -> str:
+        """What the impact's first row says in a column, or where that says nothing, the first that does."""
+        text = self.samples.texts[column][self.cell].strip()
+        if text or self.samples.are_alike(self.rows):
+            return text
+        return next(filter(None, self._distinct(column)), "")
 
     def _distinct(self, column: int) -> list[str]:
         """What the impact's rows say in a column, in their order."""
@@ -394,7 +403,7 @@ class TableImpact:
     def _text(self, column: int | None) -> str | None:
         if column is None:
             return None
-        text = self.samples.texts[column][self.cell].strip()
+        text = self._said(column)
         return (unguarded(text) if self.plan.format == "csv" else text) or None
 
     def _name(self, field: str, column: int | None) -> str | None:

@@ -112,7 +112,8 @@ class _Parting:
         """Rows of one key that follow each other."""
         runs: list[tuple[tuple[str, ...], slice]] = []
         start = 0
-        for key, run in groupby(zip(*(columns.texts[index] for index in self._keys), strict=True)):
+        cells = (map(str.strip, columns.texts[index]) for index in self._keys)
+        for key, run in groupby(zip(*cells, strict=True)):
             stop = start + sum(1 for _ in run)
             runs.append((key, slice(start, stop)))
             start = stop
@@ -131,7 +132,7 @@ class _Parting:
 def _require_filled(runs: Sequence[tuple[tuple[str, ...], slice]], first: int) -> None:
     """Refuse a name that stands in the first row of its impact only, as merged cells of a spreadsheet are saved."""
     for (before, _), (key, rows) in pairwise(runs):
-        if all(part in {named, ""} for named, part in zip(before, map(str.strip, key), strict=True)):
+        if all(part in {named, ""} for named, part in zip(before, key, strict=True)):
             raise _unreadable(
                 f"Row {first + rows.start + 1} below the headings leaves out what tells impacts apart, which the row "
                 "above it says: write it in every row."

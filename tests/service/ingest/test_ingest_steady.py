@@ -56,7 +56,6 @@ def labelled(heading: str, *cells: str, at: int = 20, behind: bool = False) -> s
     ("heading", "cells"),
     [
         ("player_id", ("p-1", "p-2")),
-        ("player_id", ("", "p-2")),
         ("device", ("d-1", "d-2")),
         ("session_id", ("s-1", "s-2")),
         ("axes", ("anatomical", "sae_j211")),
@@ -81,7 +80,9 @@ def test_with_a_column_that_tells_them_apart_each_says_its_own(behind: bool) -> 
     assert [record.athlete_external_id for record in found] == ["p-1", "p-2"]
 
 
-def test_a_cell_that_only_the_first_row_fills_says_it_of_its_impact() -> None:
+def test_a_cell_that_only_some_rows_fill_says_it_of_its_impact() -> None:
+    assert one(labelled("player_id", "", "p-1")).athlete_external_id == "p-1"
+    assert one(labelled("axes", "", "sae_j211", "", at=1)).recording.axes == "sae_j211"
     assert one(labelled("player_id", "p-1", "", at=1)).athlete_external_id == "p-1"
     assert one(labelled("player_id", "p-1 ", "p-1")).athlete_external_id == "p-1"
 
@@ -91,6 +92,22 @@ def test_times_that_go_on_with_the_samples_are_those_of_one_impact() -> None:
     assert one(labelled("occurred_at", *times, at=1)).occurred_at.isoformat() == "2026-11-20T19:00:00+00:00"
     turned = ("2026-11-20T19:00:00Z", "2026-11-20T19:00:01Z")
     assert one(labelled("occurred_at", *turned)).occurred_at.second == 0
+
+
+def test_blanks_around_a_name_are_none_of_it() -> None:
+    record = one(labelled("impact_id", "W-1", "W-1 "))
+    assert (record.external_id, record.recording.linear_acceleration.values.shape) == (None, (40, 3))
+
+
+def test_an_impact_whose_cells_of_a_signal_are_all_empty_has_no_such_signal() -> None:
+    heading, *lines = labelled("impact_id", "1", "2").splitlines()
+    empty = [",".join([*line.split(",")[:5], "", "", ""]) for line in lines[20:]]
+    whole, lacking = read("\n".join([heading, *lines[:20], *empty]))
+    assert [name for name, _ in whole.recording.signals()] == ["linear_acceleration", "angular_velocity"]
+    assert [name for name, _ in lacking.recording.signals()] == ["linear_acceleration"]
+    for cells in (["", "", "1.0"], ["x", "x", "x"], ["n/a", "?", ""]):
+        other = [",".join([*line.split(",")[:5], *cells]) for line in lines[20:]]
+        assert codes(read("\n".join([heading, *lines[:20], *other]))[1]) == [(None, "missing-sample")]
 
 
 def test_a_name_that_only_the_first_row_of_its_impact_has_is_refused() -> None:

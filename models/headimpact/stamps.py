@@ -1,0 +1,33 @@
+"""Time stamps as numbers: how exact they can be, and the rate that they say."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+ROUND_RATE = 1e-9
+"""Relative: a rate this near to a whole number of hertz is that number, which its decimal stamps could not say."""
+
+
+def rounding_s(time_s: FloatArray) -> float:
+    """How far a step between stamps may be off [s] because of the digits that a number holds.
+
+    Stamps of a clock that counts from 1970 are exact to a quarter of a microsecond: a step of 1 ms to 0.05 %.
+    """
+    return float(2.0 * np.spacing(max(abs(float(time_s[0])), abs(float(time_s[-1])))))
+
+
+def rate_said(time_s: FloatArray) -> float:
+    """Samples per second from the first stamp to the last [Hz]: a whole number where it may be one.
+
+    A stated rate is what filters are designed from: 0.0003125 s steps mean 3200 Hz, not the 3200.0000000000005 Hz that
+    the last stamp divided by its index gives.
+    """
+    span = float(time_s[-1] - time_s[0])
+    rate = float((time_s.size - 1) / span)
+    if not rate < 1e15:
+        return rate
+    whole = float(round(rate))
+    return whole if abs(rate - whole) <= max(ROUND_RATE, rounding_s(time_s) / span) * rate else rate
