@@ -327,6 +327,18 @@ def test_an_swa_files_broken_time_must_be_given_beside_it():
     assert one(swa("1", time="37:10.6"), sample_rate_hz=1000.0, occurred_at=when).occurred_at == when
 
 
+def test_an_swa_file_that_lacks_a_signal_is_one_all_the_same():
+    lines = [line.rsplit(",", 4)[0] for line in swa("1", "2").split("\n")]
+    first, second = read("\n".join(lines), sample_rate_hz=1000.0, time_zone="UTC")
+    for record in (first, second):
+        assert (record.metadata["preset"], record.device_serial, record.athlete_external_id) == (
+            "swa",
+            "sensor-3",
+            "p-9",
+        )
+        assert [name for name, _ in record.recording.signals()] == ["linear_acceleration", "angular_velocity"]
+
+
 def swa_without(*numbers: int) -> str:
     lines = swa("1").split("\n")
     return "\n".join(line for place, line in enumerate(lines, -1) if place not in numbers)

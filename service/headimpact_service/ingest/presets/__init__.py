@@ -46,10 +46,18 @@ class Preset(Strict):
         return spoken.model_copy(update={name: getattr(self.mapping, name) for name in self.mapping.model_fields_set})
 
     def fits(self, headings: Headings) -> bool:
-        """Whether a table with these headings is of this layout: every signal's columns are there."""
+        """Whether a table with these headings is of this layout: every signal's columns are there.
+
+        Of a layout that says by columns of its own what tells impacts apart, those of one signal are enough.
+        """
         mapping = self.mapping_for(headings)
         signals = [columns for name in SIGNALS if (columns := mapping.columns_of(name)) is not None]
-        return bool(signals) and all(_is_there(columns, headings) for columns in signals)
+        there = [_is_there(columns, headings) for columns in signals]
+        return bool(there) and (all(there) or (any(there) and self._tells_impacts_apart(headings)))
+
+    def _tells_impacts_apart(self, headings: Headings) -> bool:
+        keys = self.mapping.group_by or []
+        return self.vocabulary is None and len(keys) > 1 and all(headings.find(key) is not None for key in keys)
 
 
 def _with_units(mapping: Mapping, headings: Headings) -> Mapping:
