@@ -280,9 +280,9 @@ def _computed_out_of_range(plan: Plan, motion: Motion) -> dict[int, TraceError]:
     """Those of which what was computed from the samples is more than any head survives."""
     faults: dict[int, TraceError] = {}
     if plan.offset_m is not None:
-        faults |= dict.fromkeys(_beyond(motion, "linear_acceleration"), transferred_out_of_range())
+        faults |= {place: transferred_out_of_range() for place in _beyond(motion, "linear_acceleration")}
     if plan.angular_acceleration_source == "five_point_stencil":
-        faults |= dict.fromkeys(_beyond(motion, "angular_acceleration"), derived_out_of_range())
+        faults |= {place: derived_out_of_range() for place in _beyond(motion, "angular_acceleration")}
     return faults
 
 
