@@ -13,6 +13,24 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+NOTHING = frozenset({"", "-", ".", "na", "n/a", "#n/a", "nan", "nat", "null", "missing"})
+"""What stands in a cell that holds nothing, as spreadsheets, R, pandas and Julia write it; in small letters.
+
+Not `none`: that is a filter.
+"""
+NO_NUMBER = NOTHING | {"none"}
+
+
+def said(cell: str) -> str:
+    """A cell without the blanks around it; empty where it holds nothing."""
+    text = cell.strip()
+    return "" if text.lower() in NOTHING else text
+
+
+def number_text(value: float) -> str:
+    """A number that is a name, in as few digits as tell it from others: 20.1, and 20 for 20.0."""
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+
 
 class Words(Sequence[str]):
     """Cells as places in a list of the words that occur."""

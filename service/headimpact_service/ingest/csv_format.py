@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.cells import LineCells
+from headimpact_service.ingest.cells import NO_NUMBER, LineCells
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
@@ -36,7 +36,6 @@ MAX_COLUMNS = 1024
 ROWS_AT_ONCE = 4096
 _SEPARATOR = re.compile(r"sep=.\s*", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*", re.ASCII)
-_NOTHING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
 Block = tuple[FloatArray, Sequence[Sequence[str]]]
 # float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
@@ -68,6 +67,7 @@ class CsvTable:
         self._lines = _lines(stream, text.encoding)
         self._quoted = text.quoted
         self._line = 0
+        self._begun, self._empty_rows = False, 0
         heading = self._first_line(skip_rows)
         self._delimiter = delimiter_of(heading)
         self._decimal_mark = ""
@@ -100,7 +100,9 @@ class CsvTable:
         """Some thousand rows at a time: the number columns as one array, the text columns as lists."""
         self._line += 1
         while lines := list(islice(self._lines, ROWS_AT_ONCE)):
-            yield self._fast(lines, numbers, texts) or self._careful(self._parsed(lines), numbers, texts)
+            plain = None if self._empty_rows else self._fast(lines, numbers, texts)
+            yield plain or self._careful(self._parsed(lines), numbers, texts)
+            self._begun = True
             self._line += len(lines)
 
     def _parsed(self, lines: list[str]) -> list[list[str]]:
@@ -131,7 +133,7 @@ class CsvTable:
 
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
         """A block cell by cell, saying what is wrong with it."""
-        full = [fitted for row in rows if (fitted := self._fitted(row))]
+        full = [fitted for row in rows for fitted in self._fitted(row)]
         samples = np.array([[self._number(row[index]) for index in numbers] for row in full], dtype=np.float64)
         return samples.reshape(len(full), len(numbers)), [[row[index] for row in full] for index in texts]
 
@@ -141,22 +143,30 @@ class CsvTable:
         except csv.Error:
             raise unreadable(f"The quotes around line {self._line + reader.line_num} do not match.") from None
 
-    def _fitted(self, row: list[str]) -> list[str]:
-        """A row as long as the headings: spreadsheets add empty cells at the end, and rows of nothing else."""
+    def _fitted(self, row: list[str]) -> Iterator[list[str]]:
+        """A row as long as the headings, behind the rows of empty cells that it ends; those at the table's end go.
+
+        Spreadsheets add empty cells at the end, and rows of nothing else; between samples they are lost samples.
+        """
         width = len(self.headings)
         if not any(cell.strip() for cell in row):
-            return []
+            self._empty_rows += self._begun and len(row) > 1
+            return
+        if len(row) < width and row[0].lstrip().startswith("#"):
+            return
         if len(row) < width or any(cell.strip() for cell in row[width:]):
             raise unreadable(
                 f"A row from line {self._line + 1} on has {len(row)} cells where the headings have {width}."
             )
-        return row[:width]
+        yield from ([""] * width for _ in range(self._empty_rows))
+        self._begun, self._empty_rows = True, 0
+        yield row[:width]
 
     def _number(self, cell: str) -> float:
         """The number in a cell; NaN where there is none, infinite where something else stands."""
         comma = _NUMBER.fullmatch(cell) is None
         if comma and _DECIMAL_COMMA.fullmatch(cell) is None:
-            return float("nan" if cell.strip().lower() in _NOTHING else "inf")
+            return float("nan" if cell.strip().lower() in NO_NUMBER else "inf")
         if comma and not self._decimal_commas:
             return self._unclear(
                 "Whether commas in the file's numbers are decimal or group thousands is not clear: write them with a "
@@ -173,7 +183,7 @@ class CsvTable:
         """Refuse the file; between commas, where it takes quotes to write one, only the cell is none of a number."""
         if self._delimiter != ",":
             raise unreadable(detail)
-        return float("nan")
+        return float("inf")
 
 
 def _lines(stream: BinaryIO, encoding: str) -> Iterator[str]:

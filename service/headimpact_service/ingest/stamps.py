@@ -11,6 +11,10 @@ from headimpact.stamps import rate_said, rounding_s
 
 FloatArray = NDArray[np.float64]
 
+ROUNDED_TO_MS = (1.0, 0.1, 0.01)
+"""What stamps are written to."""
+NEAR, DRIFT = 0.6, 0.02
+"""How far a stamp may be from where a stated rate has its sample: in samples, and by what went by since the first."""
 UNIFORM_JITTER = 1e-6
 """Of the step: stamps that stray less from a straight line are rounded, not jittered."""
 
@@ -34,3 +38,18 @@ def before_zero_ms(spans: Iterable[tuple[float, float]]) -> float | None:
     """How long before zero the record begins [ms], where its signals' stamps span zero: that is the trigger then."""
     starts, ends = zip(*spans, strict=True)
     return round(-min(starts), 9) if min(starts) < 0.0 <= max(ends) else None
+
+
+def follows(stamps_ms: FloatArray, rate_hz: float) -> bool:
+    """Whether stamps [ms] go on at a rate, sample by sample, as far as they are rounded and clocks drift."""
+    if not stamps_ms.size:
+        return True
+    elapsed = np.arange(stamps_ms.size) * 1000.0 / rate_hz
+    rounded_to = next((grid for grid in ROUNDED_TO_MS if _are_multiples(stamps_ms, grid)), 0.0)
+    stray = np.abs(stamps_ms - stamps_ms[0] - elapsed)
+    return bool((stray <= NEAR * 1000.0 / rate_hz + rounded_to + DRIFT * elapsed).all())
+
+
+def _are_multiples(values: FloatArray, grid: float) -> bool:
+    parts = values / grid
+    return bool((np.abs(parts - np.rint(parts)) < 1e-6).all())

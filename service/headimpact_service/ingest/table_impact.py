@@ -16,6 +16,7 @@ from headimpact.filtering import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant
 from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
 from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES, MIN_RATE_HZ
@@ -33,14 +34,12 @@ from headimpact_service.ingest.layout import Clock, Layout, SignalLayout
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
-from headimpact_service.ingest.stamps import before_zero_ms
+from headimpact_service.ingest.stamps import before_zero_ms, follows
 from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, Window
 
-MAX_RATE_DIFFERENCE = 0.05
-"""Stamps may be rounded; a rate of another sensor is further away."""
 ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
 
@@ -158,7 +157,7 @@ class TableImpact:
     def _reading_at(self, cell: int) -> Reading:
         """The same of one part of an impact."""
         columns = self.layout.reading.items()
-        return self._reading((field, self.samples.texts[column][cell].strip()) for field, column in columns)
+        return self._reading((field, said(self.samples.texts[column][cell])) for field, column in columns)
 
     def _reading(self, cells: Iterable[tuple[str, str]]) -> Reading:
         if not self.layout.reading:
@@ -170,10 +169,12 @@ class TableImpact:
         fill_gaps = options.fill_gaps or reading.fill_gaps or bool(mapping.fill_gaps)
         self._require_counted(allow_gaps=fill_gaps)
         tracks = self._tracks()
-        for track in tracks:
-            self._require_whole(track, samples=scorable and not fill_gaps)
         # The signals before the drop say when the record began, those after it when what is kept begins.
         kept = [self._without_first(track) for track in tracks]
+        for whole, track in zip(tracks, kept, strict=True):
+            self._require_times(whole)
+            if scorable and not fill_gaps:
+                self._require_samples(track)
         signals: dict[str, Any] = {
             track.name: self._signal(track, base) for track, base in zip(kept, time_bases(kept), strict=True)
         }
@@ -250,11 +251,11 @@ class TableImpact:
         rate = reading.sample_rate_hz
         if rate is None or clock is None:
             return rate
-        stamps = self._stamps(clock.column, rows)
-        steps = np.diff(stamps[np.isfinite(stamps)]) * clock.milliseconds
-        if steps.size and abs(float(np.median(steps)) * rate / 1000.0 - 1.0) > MAX_RATE_DIFFERENCE:
+        stamps = self._stamps(clock.column, rows) * clock.milliseconds
+        if not follows(stamps[np.isfinite(stamps)], rate):
             raise label_fault(
-                f"The impact's sample_rate_hz and its times differ by more than {MAX_RATE_DIFFERENCE:.0%}.",
+                "The impact's times do not go on at its sample_rate_hz: they leave out samples, begin anew or are of "
+                "another rate.",
                 "rate-differs",
                 parameter="sample_rate_hz",
             )
@@ -300,13 +301,17 @@ class TableImpact:
                 "sample-order",
             )
 
-    def _require_whole(self, track: Track, *, samples: bool) -> None:
-        """Refuse a missing time, and a missing sample unless it is to be filled or never to be scored."""
-        signal = self.layout.signals[track.name]
-        clock = signal.clock or self.layout.clock
-        columns = ([] if clock is None or track.rate is not None else [clock.column]) + (
-            signal.columns if samples else []
-        )
+    def _require_times(self, track: Track) -> None:
+        """Refuse a missing time."""
+        clock = self.layout.signals[track.name].clock or self.layout.clock
+        if clock is not None and track.rate is None:
+            self._require_finite([clock.column], track)
+
+    def _require_samples(self, track: Track) -> None:
+        """Refuse a missing sample."""
+        self._require_finite(self.layout.signals[track.name].columns, track)
+
+    def _require_finite(self, columns: list[int], track: Track) -> None:
         self.samples.require_finite(columns, track.rows, self.samples.window.first + self.first)
 
     def _without_first(self, track: Track) -> Track:
@@ -372,7 +377,7 @@ class TableImpact:
 
     def _said(self, column: int) -> str:
         """What the impact's first row says in a column, or where that says nothing, the first that does."""
-        text = self.samples.texts[column][self.cell].strip()
+        text = said(self.samples.texts[column][self.cell])
         if text or self.samples.are_alike(self.rows):
             return text
         return next(filter(None, self._distinct(column)), "")
@@ -380,14 +385,14 @@ class TableImpact:
     def _distinct(self, column: int) -> list[str]:
         """What the impact's rows say in a column, in their order."""
         cells = self.samples.texts[column]
-        said = cells[self.rows] if isinstance(self.rows, slice) else map(cells.__getitem__, self.rows)
-        return list(dict.fromkeys(cell.strip() for cell in said))
+        told = cells[self.rows] if isinstance(self.rows, slice) else map(cells.__getitem__, self.rows)
+        return list(dict.fromkeys(map(said, told)))
 
     def _require_one_time(self, columns: Sequence[int]) -> None:
         """Times that go on from sample to sample are those of the samples; others are of several impacts."""
         texts = [self.samples.texts[column] for column in columns]
         rows = range(self.rows.start, self.rows.stop) if isinstance(self.rows, slice) else self.rows
-        told = dict.fromkeys(tuple(cells[row].strip() for cells in texts) for row in rows)
+        told = dict.fromkeys(tuple(said(cells[row]) for cells in texts) for row in rows)
         moments = [moment(list(parts), self.options.time_zone) for parts in told if all(parts)]
         known = [when for when in moments if when is not None]
         if known and (max(known) - min(known)).total_seconds() > len(rows) / MIN_RATE_HZ + ROUNDED_TO_S:

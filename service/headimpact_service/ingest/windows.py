@@ -9,7 +9,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.cells import Stacked
+from headimpact_service.ingest.cells import Stacked, said
 from headimpact_service.ingest.table import Columns
 
 WINDOW_ROWS = 65_536
@@ -112,12 +112,12 @@ class _Parting:
         """Rows of one key that follow each other."""
         runs: list[tuple[tuple[str, ...], slice]] = []
         start = 0
-        cells = (map(str.strip, columns.texts[index]) for index in self._keys)
+        cells = (map(said, columns.texts[index]) for index in self._keys)
         for key, run in groupby(zip(*cells, strict=True)):
             stop = start + sum(1 for _ in run)
             runs.append((key, slice(start, stop)))
             start = stop
-        return runs
+        return runs if all(any(key) for key, _ in runs) else _without_empty(columns, runs)
 
     def _window(self, columns: Columns, runs: list[tuple[tuple[str, ...], slice]], first: int) -> Window:
         parts: dict[tuple[str, ...], list[slice]] = {}
@@ -127,6 +127,17 @@ class _Parting:
             raise _unreadable(_APART)
         self._given.update(parts)
         return Window(columns, [rows[0] if len(rows) == 1 else _joined(rows) for rows in parts.values()], first)
+
+
+def _without_empty(columns: Columns, runs: list[tuple[tuple[str, ...], slice]]) -> list[tuple[tuple[str, ...], slice]]:
+    """The runs without the rows of empty cells that part impacts from each other; within one they are lost samples."""
+    kept: list[tuple[tuple[str, ...], slice]] = []
+    for key, rows in runs:
+        if any(key) or len(runs) == 1 or not all(np.isnan(cells[rows]).all() for cells in columns.numbers.values()):
+            kept.append((key, rows))
+    if any(before == key for (before, _), (key, _) in pairwise(kept)):
+        raise _unreadable("Rows of empty cells stand between the samples of one impact: give their values or times.")
+    return kept or runs
 
 
 def _require_filled(runs: Sequence[tuple[tuple[str, ...], slice]], first: int) -> None:

@@ -75,7 +75,7 @@ class TestReading:
             ("mounting", "left", "wrong-type"),
             ("sample_rate_hz", "fast", "wrong-type"),
             ("sample_rate_hz", "100", "out-of-range"),
-            ("sample_rate_hz", "nan", "out-of-range"),
+            ("sample_rate_hz", "inf", "out-of-range"),
             ("pre_trigger_ms", "-1", "out-of-range"),
             ("constrained_plane", "oblique", "not-allowed"),
         ],

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from headimpact_service.ingest.cells import Words
+from headimpact_service.ingest.cells import Words, number_text
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
 from headimpact_service.ingest.table import Columns, FloatArray
 
@@ -28,7 +28,9 @@ Batches = Callable[[list[int]], Iterator[pa.RecordBatch]]
 def is_number(kind: pa.DataType) -> bool:
     """Whether cells of this type are numbers."""
     types = pa.types
-    return bool(types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind))
+    return bool(
+        types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_null(kind)
+    )  # a column without any value is of no type
 
 
 def is_list_of_numbers(kind: pa.DataType) -> bool:
@@ -89,7 +91,7 @@ def _texts(values: pa.Array) -> list[str]:
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_integer(kind):
         return ["" if value is None else str(value) for value in values.to_pylist()]
     if pa.types.is_floating(kind):
-        return ["" if value is None else f"{value:.17g}" for value in values.to_pylist()]
+        return ["" if value is None else number_text(value) for value in values.to_pylist()]
     if pa.types.is_timestamp(kind):
         micros = values.cast(pa.timestamp("us", kind.tz), safe=False).cast(pa.int64()).to_pylist()
         return ["" if value is None else _instant(value, placed=kind.tz is not None) for value in micros]

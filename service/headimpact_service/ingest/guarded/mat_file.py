@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, TypeGuard
 import numpy as np
 from scipy.io import loadmat, savemat
 
+from headimpact_service.ingest.cells import number_text
 from headimpact_service.ingest.guarded.array_table import AXES, MAX_LENGTH, ROWS_AT_ONCE, ArrayTable, Fact, Samples
 from headimpact_service.ingest.guarded.contents import (
     Content,
@@ -194,7 +195,7 @@ def _text(cell: Any) -> str:  # noqa: ANN401 - whatever a file holds
         return _text(cell.reshape(-1)[0].item()) if cell.size == 1 and cell.dtype.kind in "USfiu" else ""
     if isinstance(cell, str):
         return checked_text(cell)
-    return f"{cell:.17g}" if isinstance(cell, int | float) else ""
+    return number_text(float(cell)) if isinstance(cell, int | float) else ""
 
 
 class StructTable:

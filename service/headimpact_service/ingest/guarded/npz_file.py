@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from headimpact_service.ingest.cells import number_text
 from headimpact_service.ingest.guarded.array_table import ArrayTable, Fact, Samples
 from headimpact_service.ingest.guarded.contents import MAX_TEXT, Content, NamedTable, checked_text, unreadable
 from headimpact_service.ingest.table import FloatArray
@@ -157,7 +158,7 @@ def _fact(archive: GuardedZip, member: _Member, impacts: int) -> Fact:
     if member.is_text:
         return Fact(member.name, None, _texts(archive, member))
     numbers = _numbers(archive, member)
-    return Fact(member.name, numbers, [f"{number:.17g}" for number in numbers.reshape(-1).tolist()])
+    return Fact(member.name, numbers, [number_text(number) for number in numbers.reshape(-1).tolist()])
 
 
 class _Rows:

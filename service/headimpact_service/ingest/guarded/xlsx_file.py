@@ -10,13 +10,14 @@ import datetime as dt
 import io
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import numpy as np
 from python_calamine import CalamineSheet, CalamineWorkbook, SheetTypeEnum
 
+from headimpact_service.ingest.cells import NO_NUMBER, NOTHING, number_text
 from headimpact_service.ingest.guarded.contents import (
     Content,
     NamedTable,
@@ -132,15 +133,30 @@ def _blocks(sheet: CalamineSheet) -> list[_Block]:
     """Rows below the headings they belong to; rows without a number are words between them."""
     blocks: list[_Block] = []
     before: Row = []
+    empty: list[Row] = []
     for row in sheet.iter_rows():
+        if blocks and _holds_nothing(row):
+            empty.append(row)
+            continue
         if _has_number(row):
             columns = _named_columns(before)
             if len(columns) > 1 and sum(_is_number(row[column]) for column in columns) > 1:
                 blocks.append(_Block(columns, [before[column].strip() for column in columns]))
+                empty = []
             if blocks:
-                blocks[-1].rows.append(row)
+                blocks[-1].rows += [*empty, row]
+                empty = []
         before = row
     return blocks
+
+
+def _holds_nothing(row: Row) -> bool:
+    """A row of lost samples, if more samples follow: the end of a block, if they do not."""
+    return all(_is_nothing(cell, NOTHING) for cell in row)
+
+
+def _is_nothing(cell: Any, words: Collection[str]) -> bool:  # noqa: ANN401 - any cell
+    return cell is None or (isinstance(cell, str) and cell.strip().lower() in words)
 
 
 def _named_columns(row: Row) -> list[int]:
@@ -161,12 +177,14 @@ def _is_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
 def _number(cell: Any) -> float:  # noqa: ANN401 - any cell
     if _is_number(cell):
         return float(cell)
-    return float(cell) if isinstance(cell, str) and _NUMBER.fullmatch(cell) else float("nan")
+    if isinstance(cell, str) and _NUMBER.fullmatch(cell):
+        return float(cell)
+    return float("nan" if _is_nothing(cell, NO_NUMBER) else "inf")
 
 
 def _text(cell: Any) -> str:  # noqa: ANN401 - any cell
     if isinstance(cell, dt.date | dt.time):
         return cell.isoformat()
     if isinstance(cell, float):
-        return f"{cell:.17g}"
+        return number_text(cell)
     return checked_text(str(cell))
