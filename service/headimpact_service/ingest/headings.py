@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,11 +91,24 @@ class Vocabulary:
         """Spell out all headings of a preset's vocabulary."""
         self._meanings: dict[str, Meaning] = {}
         self._stems: dict[str, tuple[SignalName, str]] = {}
+        self._telling = self._tell(table)
         for signal in SIGNALS:
             self._learn(signal, table[signal])
+        self._clocks: list[str] = []
         for word in table["time"]["words"]:
             for unit, spellings in _units(table["time"]):
                 self._add(compact(word) + spellings, Meaning(None, None, unit))
+                self._clocks.append(compact(word) + spellings)
+
+    def _tell(self, table: Mapping[str, Any]) -> dict[str, SignalName]:
+        """Spellings of units of rotation: three columns of one are a signal, whatever else they are called."""
+        told: dict[str, SignalName] = {
+            spelling: signal
+            for signal in SIGNALS
+            for unit, spelling in _units(table[signal])
+            if unit is not None and signal != "linear_acceleration"
+        }
+        return {unit: told[unit] for unit in sorted(told, key=len, reverse=True)}
 
     def _learn(self, signal: SignalName, words_and_units: Mapping[str, Any]) -> None:
         words = [compact(word) for word in words_and_units["words"]]
@@ -105,6 +118,8 @@ class Vocabulary:
                 for unit, spelling in _units(words_and_units):
                     for stem in _stems(word, axis):
                         self._add(stem + spelling, Meaning(signal, axis, unit))
+                    if unit is not None and len(word) >= 3:  # gyro [rad/s] x
+                        self._add(word + spelling + axis, Meaning(signal, axis, unit))
 
     def _add(self, heading: str, meaning: Meaning) -> None:
         if self._meanings.setdefault(heading, meaning) != meaning:
@@ -123,8 +138,20 @@ class Vocabulary:
             if stem is not None:
                 signal, axis = self._stems[stem]
                 found.setdefault((signal, name.removeprefix(stem)), {}).setdefault(axis, heading)
+            for signal, rest in self._by_unit(name):
+                for place, axis in enumerate(rest):
+                    if axis in AXES:
+                        alike = f"{rest[:place]}*{rest[place + 1 :]}"
+                        found.setdefault((signal, alike), {}).setdefault(axis, heading)
         whole = {signal: by_axis for (signal, _), by_axis in found.items() if len(by_axis) == len(AXES)}
         return {signal: [by_axis[axis] for axis in AXES] for signal, by_axis in whole.items()}
+
+    def _by_unit(self, name: str) -> Iterator[tuple[SignalName, str]]:
+        """What is left of a name that holds a unit of one signal only, without it: the longest that it holds."""
+        unit = next((unit for unit in self._telling if unit in name), None)
+        if unit is not None:
+            before, _, behind = name.rpartition(unit)
+            yield self._telling[unit], before + "|" + behind
 
     def mapping(self, headings: Headings) -> mappings.Mapping:
         """The mapping that a table's headings, each with the unit beside it, amount to."""
@@ -137,9 +164,12 @@ class Vocabulary:
             columns = {heading: m for heading, m in found if m.signal == signal}
             if columns:
                 fields[signal] = _signal_columns(signal, columns)
-        times = [{"column": heading, "unit": m.unit} for heading, m in found if m.signal is None and m.unit]
+        # of several, the first by its word: a column of the event's timestamp may stand beside the samples' times
+        times = [(heading, m.unit) for heading, m in found if m.signal is None and m.unit]
         if times:
-            fields["time"] = times[0]
+            spoken = dict(zip(headings.written, headings.spoken, strict=True))
+            heading, unit = min(times, key=lambda time: self._clocks.index(compact(spoken[time[0]])))
+            fields["time"] = {"column": heading, "unit": unit}
         return mappings.Mapping.model_validate(fields)
 
 

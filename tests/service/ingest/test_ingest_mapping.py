@@ -404,6 +404,41 @@ def test_columns_that_are_no_whole_signal_or_a_signals_other_form_are_passed_ove
     assert record.recording.angular_velocity is None
 
 
+@pytest.mark.parametrize(
+    "spelling",
+    [
+        "Gyroscope {} (rad/s)",
+        "gyroscope_{}_rad_s",
+        "Angular Rate {} (rad/s)",
+        "av{}_rad_s",
+        "Angular velocity (rad/s) {}",
+    ]
+    + [
+        "gyro [rad/s] {}",
+        "omega_rad_s_{}",
+        "Winkelgeschwindigkeit {} (rad/s)",
+        "Drehrate {} [rad/s]",
+        "rot_{} (rad/s)",
+    ],
+)
+def test_rotation_is_found_under_its_other_names(spelling):
+    record = one(table(",".join(["t_ms,ax_g,ay_g,az_g", *(spelling.format(axis) for axis in "xyz")])))
+    assert peaks(record.recording.angular_velocity) == [4.0, 5.0, 6.0]
+    assert record.recording.angular_velocity.unit == "rad/s"
+
+
+def test_columns_in_a_unit_of_rotation_are_never_passed_over_whatever_they_are_called():
+    problem = refused(table("t_ms,ax_g,ay_g,az_g,phi_x (deg/s),phi_y (deg/s),phi_z (deg/s)"))
+    assert codes(problem) == [("/angular_velocity", "columns-not-read")]
+    assert one(table("t_ms,ax_g,ay_g,az_g,roll_deg,pitch_deg,yaw_deg,qx,qy,qz,x_mm,y_mm,z_mm"))
+
+
+def test_of_several_columns_of_times_that_of_the_samples_is_taken():
+    text = table("t_ms,ax_g,ay_g,az_g").splitlines()
+    stamped = "\n".join(["timestamp_ms," + text[0], *("1763665445123," + line for line in text[1:])])
+    assert one(stamped).recording.linear_acceleration.sample_rate_hz == 1000.0
+
+
 def test_greek_letters_and_signs_of_degrees_are_read():
     record = one(table("t_ms,ωx (°/s),ωy (°/s),ωz (°/s),αx (rad/s²),αy (rad/s²),αz (rad/s²)"))
     assert record.recording.angular_velocity.unit == "deg/s"

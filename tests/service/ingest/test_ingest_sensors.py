@@ -106,9 +106,21 @@ class TestOwnTimes:
         own = mapping(linear_acceleration=ACCELERATION | {"sample_rate_hz": 1600})
         assert codes(refused(table(SIX, six_axis().tolist()), mapping=own)) == [("sample_rate_hz", "rate-missing")]
 
-    @pytest.mark.parametrize(("rate", "said"), [(1000.0, None), (1010.0, None), (3200.0, "rate-differs")])
-    def test_a_rate_and_times_of_one_impact_must_agree(self, rate: float, said: str | None):
-        rows = [[i, *row, rate] for i, row in enumerate(six_axis().tolist())]
+    @pytest.mark.parametrize(
+        ("rate", "stamps", "said"),
+        [
+            (1000.0, lambda i: i, None),
+            (1010.0, lambda i: i, None),
+            (3200.0, lambda i: round(i / 3.2), None),  # written to the millisecond
+            (1600.0, lambda i: round(i / 1.6) / 1000 * 1000, None),
+            (3200.0, lambda i: i, "rate-differs"),
+            (1000.0, lambda i: i % 20, "rate-differs"),  # two impacts, one below the other
+            (1000.0, lambda i: i if i < 10 else i + 30, "rate-differs"),
+            (1000.0, lambda i: i + 0.125 if i < 10 else i + 1.125, "rate-differs"),
+        ],
+    )
+    def test_a_rate_and_times_of_one_impact_must_agree(self, rate: float, stamps: Any, said: str | None):
+        rows = [[stamps(i), *row, rate] for i, row in enumerate(six_axis().tolist())]
         text = table(["t_ms", "ax_g", "ay_g", "az_g", "wx_rad_s", "wy_rad_s", "wz_rad_s", "sample_rate_hz"], rows)
         if said is None:
             assert one(text).recording.linear_acceleration.sample_rate_hz == rate

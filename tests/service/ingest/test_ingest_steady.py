@@ -13,6 +13,7 @@ from ingest_files import codes, csv_text, one, read, refused
 
 from headimpact_service.ingest import csv_format
 from headimpact_service.ingest.cells import LineCells, Stacked, Words
+from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.steady import changed_rows
 
@@ -116,6 +117,62 @@ def test_a_name_that_only_the_first_row_of_its_impact_has_is_refused() -> None:
     assert "Row 2 below the headings leaves out" in problem.detail
     nameless = one(labelled("impact_id", ""))
     assert (nameless.external_id, nameless.recording.linear_acceleration.values.shape) == (None, (40, 3))
+
+
+@pytest.mark.parametrize("nothing", ["NA", "nan", "#N/A", "null", " "])
+def test_what_stands_for_nothing_is_no_name(nothing: str) -> None:
+    record = one(labelled("player_id,device,occurred_at,sex", f"{nothing},{nothing},{nothing},{nothing}"))
+    assert (record.athlete_external_id, record.device_serial, record.occurred_at) == (None, None, None)
+    merged = ["1", *[nothing] * 19, "2", *[nothing] * 19]
+    assert "leaves out what tells impacts apart" in refused(labelled("impact_id", *merged, at=1)).detail
+
+
+def test_a_filter_that_is_none_is_not_nothing() -> None:
+    assert one(labelled("filter", "none")).recording.low_pass.name == "none"
+
+
+def untimed_rows(*empty: int, key: str | None = None) -> str:
+    """The usual table without times, some of its rows without a value, as a lost sample is saved."""
+    heading, *lines = (line.partition(",")[2] for line in csv_text().splitlines())
+    rows = [",,,,," if number in empty else line for number, line in enumerate(lines)]
+    if key is not None:
+        heading, rows = f"impact_id,{heading}", [f"{key if row[0] != ',' else ''},{row}" for row in rows]
+    return "\n".join([heading, *rows])
+
+
+def test_a_row_of_empty_cells_is_a_lost_sample_between_others_and_nothing_at_the_end() -> None:
+    assert codes(refused(untimed_rows(20), sample_rate_hz=1000.0)) == [(None, "missing-sample")]
+    assert "empty cells stand between" in refused(untimed_rows(20, key="1"), sample_rate_hz=1000.0).detail
+    for text in (untimed_rows(38, 39), untimed_rows(38, 39, key="1"), untimed_rows(0)):
+        count = 38 if text.endswith(",") else 39
+        assert one(text, sample_rate_hz=1000.0).recording.linear_acceleration.values.shape == (count, 3)
+
+
+def test_rows_of_empty_cells_may_part_impacts() -> None:
+    first, second = untimed_rows(key="1"), untimed_rows(key="2").split("\n", 1)[1]
+    found = read("\n".join([first, ",,,,,,", ",,,,,,", second]), sample_rate_hz=1000.0)
+    assert [record.recording.linear_acceleration.values.shape for record in found] == [(40, 3), (40, 3)]
+
+
+def test_quoted_decimal_commas_among_points_are_no_empty_cells() -> None:
+    heading, *lines = csv_text().splitlines()
+    mixed = [
+        ",".join([*line.split(",")[:4], *(f'"{cell}"'.replace(".", ",") for cell in line.split(",")[4:])])
+        for line in lines
+    ]
+    assert codes(refused("\n".join([heading, *mixed]))) == [(None, "missing-sample")]
+
+
+def test_comments_below_the_headings_are_passed_over() -> None:
+    heading, *lines = csv_text().splitlines()
+    assert one("\n".join([heading, *lines[:20], "# half way", *lines[20:], "# end"])).recording.linear_acceleration
+
+
+def test_a_corrupt_first_row_that_is_left_out_may_hold_nothing() -> None:
+    heading, *lines = csv_text().splitlines()
+    first = lines[0].split(",")[0] + ",,NaN,,,,"
+    record = one("\n".join([heading, first, *lines[1:]]), mapping=Mapping.model_validate({"drop_rows": 1}))
+    assert record.recording.linear_acceleration.values.shape == (39, 3)
 
 
 def test_a_window_of_rows_is_looked_through_once_for_all_its_impacts() -> None:
