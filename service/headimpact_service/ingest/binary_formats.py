@@ -76,6 +76,7 @@ class _Reading:
         self._kind, self._options = kind, options
         self._count = 0
         self._unknown: Problem | None = None
+        self._refused: Problem | None = None
 
     def lines(self, lines: GuardedLines) -> Impacts:
         """Rows in the shape of our JSON."""
@@ -97,16 +98,16 @@ class _Reading:
         except Problem as problem:
             if _is_unknown(problem):
                 self._unknown = self._unknown or problem
-            elif table.name is None or problem.errors or problem.slug != "unreadable-file":
+            elif table.name is None or problem.slug != "unreadable-file":
                 raise
             else:
-                self._count += 1
-                yield problem
+                self._refused = self._refused or problem
+                yield Problem(problem.slug, f"Sheet {table.name}: {problem.detail}", errors=problem.errors)
 
     def require_impacts(self) -> None:
         """Refuse a file of which no table was read."""
         if self._count == 0:
-            raise self._unknown or Problem("unreadable-file", "The file holds no impact.")
+            raise self._refused or self._unknown or Problem("unreadable-file", "The file holds no impact.")
 
 
 def _is_unknown(problem: Problem) -> bool:

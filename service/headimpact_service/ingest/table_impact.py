@@ -237,7 +237,9 @@ class TableImpact:
     def _track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
         signal = self.layout.signals[name]
         clock = signal.clock or self.layout.clock
-        rate = self.options.sample_rate_hz or self._said_rate(reading, clock, rows)
+        own_rate = signal.sample_rate_hz if signal.clock is None else None
+        asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
+        rate = self.options.sample_rate_hz or self._said_rate(reading, clock, rows) or own_rate or asked
         if signal.clock is not None or signal.sample_rate_hz is not None or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         if clock is None:

@@ -31,6 +31,7 @@ class Track:
         return float(self.stamps[0]) * self.milliseconds, float(self.stamps[-1]) * self.milliseconds
 
 
+_UNSCALED = {1.0, 1000.0}
 TimeBase = tuple[float | None, FloatArray | None]
 """A rate [Hz], or the stamps [s] where they say none."""
 
@@ -59,10 +60,10 @@ def time_bases(tracks: Sequence[Track]) -> list[TimeBase]:
 def _origin(stamped: Sequence[Track]) -> float:
     """What is taken off the stamps before they are scaled: counts of hours would lose their last digits.
 
-    Milliseconds are not scaled but divided by 1000, as everywhere: they stay as they are.
+    Seconds stay as they are, and milliseconds are divided by 1000, as everywhere.
     """
     units = {track.milliseconds for track in stamped}
-    if len(units) != 1 or units == {1.0}:
+    if len(units) != 1 or units <= _UNSCALED:
         return 0.0
     return min(
         (float(track.stamps[0]) for track in stamped if track.stamps is not None and track.stamps.size), default=0.0
@@ -71,4 +72,6 @@ def _origin(stamped: Sequence[Track]) -> float:
 
 def _seconds(track: Track, origin: float) -> FloatArray:
     stamps = np.empty(0) if track.stamps is None else track.stamps
+    if track.milliseconds == 1000.0:
+        return stamps
     return (stamps if track.milliseconds == 1.0 else (stamps - origin) * track.milliseconds) / 1000.0

@@ -412,8 +412,6 @@ def test_columns_that_are_no_whole_signal_or_a_signals_other_form_are_passed_ove
         "Angular Rate {} (rad/s)",
         "av{}_rad_s",
         "Angular velocity (rad/s) {}",
-    ]
-    + [
         "gyro [rad/s] {}",
         "omega_rad_s_{}",
         "Winkelgeschwindigkeit {} (rad/s)",

@@ -156,10 +156,8 @@ def test_rows_of_empty_cells_may_part_impacts() -> None:
 
 def test_quoted_decimal_commas_among_points_are_no_empty_cells() -> None:
     heading, *lines = csv_text().splitlines()
-    mixed = [
-        ",".join([*line.split(",")[:4], *(f'"{cell}"'.replace(".", ",") for cell in line.split(",")[4:])])
-        for line in lines
-    ]
+    cells = [line.split(",") for line in lines]
+    mixed = [",".join([*row[:4], *(f'"{cell}"'.replace(".", ",") for cell in row[4:])]) for row in cells]
     assert codes(refused("\n".join([heading, *mixed]))) == [(None, "missing-sample")]
 
 

@@ -233,7 +233,7 @@ class StructTable:
 
     def _headings_of(self, name: str) -> list[tuple[str, int | None]]:
         """A field's headings: of three components one each, of times also that with the unit that makes 1 kHz."""
-        cells = [value for impact in self._impacts if _is_numeric(value := impact.get(name))]
+        cells = [value for impact in self._impacts if _holds_samples(value := impact.get(name))]
         if cells and all(_by_samples(value).shape[1] == 3 for value in cells):
             return [(f"{name}_{axis}", part) for part, axis in enumerate(AXES)]
         if not cells or any(_by_samples(value).shape[1] != 1 for value in cells):
@@ -244,6 +244,8 @@ class StructTable:
     def _column(self, impact: dict[str, Any], place: int) -> FloatArray:
         name, part = self._columns[place]
         value: Any = impact.get(name)
+        if part is not None and not _holds_samples(value) and _is_numeric(value):
+            return np.empty(0)  # this impact has no such samples
         if part is None or not _is_numeric(value):
             raise unreadable(f"The field {name} of the struct holds no column of numbers.")
         return _by_samples(value)[:, part].astype(np.float64)
@@ -251,6 +253,11 @@ class StructTable:
 
 def _is_numeric(value: Any) -> TypeGuard[AnyArray]:  # noqa: ANN401 - whatever a file holds
     return isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.ndim == 2
+
+
+def _holds_samples(value: Any) -> TypeGuard[AnyArray]:  # noqa: ANN401 - whatever a file holds
+    """Neither nothing nor a lone number, as which MATLAB writes what is not there."""
+    return _is_numeric(value) and value.size > 1
 
 
 def _by_samples(value: AnyArray) -> AnyArray:

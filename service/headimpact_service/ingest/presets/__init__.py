@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Annotated, Any, Literal
@@ -41,23 +42,44 @@ class Preset(Strict):
     def mapping_for(self, headings: Headings) -> Mapping:
         """The preset's mapping, completed by what the headings say: all that its vocabulary reads, or units only."""
         if self.vocabulary is None:
-            return _with_units(self.mapping, headings) if "units" in self.requires else self.mapping
+            own = _with_units(self.mapping, headings) if "units" in self.requires else self.mapping
+            return _with_names(own, headings)
         spoken = _vocabulary(self.name).mapping(headings)
         return spoken.model_copy(update={name: getattr(self.mapping, name) for name in self.mapping.model_fields_set})
 
     def fits(self, headings: Headings) -> bool:
         """Whether a table with these headings is of this layout: every signal's columns are there.
 
-        Of a layout that says by columns of its own what tells impacts apart, those of one signal are enough.
+        Those of one signal are enough beside other columns of this device: those that tell its impacts apart, or the
+        resultants that it writes itself.
         """
         mapping = self.mapping_for(headings)
         signals = [columns for name in SIGNALS if (columns := mapping.columns_of(name)) is not None]
-        there = [_is_there(columns, headings) for columns in signals]
-        return bool(there) and (all(there) or (any(there) and self._tells_impacts_apart(headings)))
+        there = [columns for columns in signals if _is_there(columns, headings)]
+        return bool(there) and (len(there) == len(signals) or self._is_marked(headings, there))
 
-    def _tells_impacts_apart(self, headings: Headings) -> bool:
-        keys = self.mapping.group_by or []
-        return self.vocabulary is None and len(keys) > 1 and all(headings.find(key) is not None for key in keys)
+    def _is_marked(self, headings: Headings, there: Sequence[SignalColumns]) -> bool:
+        if self.vocabulary is not None:
+            return False
+        keys, resultants = self.mapping.group_by or [], [columns.resultant for columns in there]
+        apart = len(keys) > 1 and all(headings.find(key) is not None for key in keys)
+        return apart or all(names and set(names) & set(headings.written) for names in resultants)
+
+
+def _with_names(mapping: Mapping, headings: Headings) -> Mapping:
+    """The mapping with the generic columns of names, times and reading, where a table has them beside a device's own.
+
+    Whoever joins a device's files into one table adds them.
+    """
+    generic = _generic().mapping
+    fields = ("external_id", "athlete", "device", "session_id", "occurred_at")
+    added: dict[str, Any] = {name: getattr(generic, name) for name in fields if getattr(mapping, name) is None}
+    if not mapping.group_by:
+        added["group_by"] = generic.group_by
+    reading = {name: spelled for name, spelled in (generic.reading or {}).items() if headings.find(spelled) is not None}
+    if reading:
+        added["reading"] = reading | (mapping.reading or {})
+    return mapping.model_copy(update=added)
 
 
 def _with_units(mapping: Mapping, headings: Headings) -> Mapping:
