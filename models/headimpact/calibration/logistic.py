@@ -158,8 +158,12 @@ def fit(sample: Sample, weights: FloatArray | None = None) -> LogisticFit:
     beta = scaled.coefficients[:, 0]
     p = risk_of(scaled_design @ beta[:, None])
     information = _Problem(scaled_design, sample.y).information(w * p * (1.0 - p))[0]
-    covariance = np.linalg.inv(information) / np.outer(sample.scale, sample.scale)
-    return LogisticFit(sample, beta / sample.scale, covariance, bool(scaled.converged[0]), int(scaled.iterations))
+    try:
+        inverse, settled = np.linalg.inv(information), bool(scaled.converged[0])
+    except np.linalg.LinAlgError:  # every probability has run to 0 or 1: the sample is separated
+        inverse, settled = np.full_like(information, np.nan), False
+    covariance = inverse / np.outer(sample.scale, sample.scale)
+    return LogisticFit(sample, beta / sample.scale, covariance, settled, int(scaled.iterations))
 
 
 def require_fittable(sample: Sample) -> None:

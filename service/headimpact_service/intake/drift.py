@@ -11,10 +11,18 @@ from headimpact.calibration.drift import group_shifts, risk_adjusted_cusum
 from headimpact.calibration.rare_events import prior_offset
 from headimpact.risk import RiskModel
 from headimpact_service.intake.cohorts import Selected
+from headimpact_service.store.cohorts import LabelledImpact
+from headimpact_service.store.columns import EPOCH
 from headimpact_service.store.tables import CRITERION_COLUMNS, VALUE_COLUMNS
 
 REFERENCE = "bam"
 _FIRST = VALUE_COLUMNS.index(CRITERION_COLUMNS[REFERENCE][0])
+
+
+def _in_order_of_time(selected: Selected) -> list[tuple[LabelledImpact, float]]:
+    """As the impacts happened, whenever they were sent; those of no known time last, in the order of their ids."""
+    pairs = list(zip(selected.impacts, selected.outcomes, strict=True))
+    return sorted(pairs, key=lambda pair: (pair[0].occurred_at is None, pair[0].occurred_at or EPOCH, pair[0].id))
 
 
 def drift_document(selected: Selected, active: RiskModel, tau: float | None) -> dict[str, Any] | None:
@@ -26,7 +34,7 @@ def drift_document(selected: Selected, active: RiskModel, tau: float | None) -> 
         return None
     rows = [
         (impact.values[_FIRST : _FIRST + 3], outcome, impact.device or "")
-        for impact, outcome in zip(selected.impacts, selected.outcomes, strict=True)
+        for impact, outcome in _in_order_of_time(selected)
         if None not in impact.values[_FIRST : _FIRST + 3]
     ]
     y = np.array([outcome for _, outcome, _ in rows])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from headimpact.criteria import CRITERION_KEYS
 from headimpact_service.ingest.impact_json import CriterionKey, Incidence, Moment, Strict, Text, Word
@@ -27,6 +27,12 @@ class CohortBody(Strict):
     include: Annotated[list[Literal["unverified", "false_positive", "not_worn"]], Field(max_length=3)] = Field(
         default=[], description="Kinds of impacts that stay out otherwise."
     )
+
+    @model_validator(mode="after")
+    def _goes_forward(self) -> CohortBody:
+        if self.occurred_from is not None and self.occurred_to is not None and self.occurred_from >= self.occurred_to:
+            raise ValueError("A cohort's occurred_from is before its occurred_to.")
+        return self
 
 
 def _known(name: str) -> str:
@@ -74,10 +80,23 @@ class FitBody(Strict):
     )
     title: Text | None = None
 
+    @model_validator(mode="after")
+    def _incidence_is_in_its_range(self) -> FitBody:
+        bounds = self.incidence_range
+        if self.incidence is not None and bounds is not None and not bounds[0] <= self.incidence <= bounds[1]:
+            raise ValueError("An incidence lies within its incidence_range.")
+        return self
+
 
 def _coefficient(name: str) -> str:
     """One of a criterion's coefficients, or all of them."""
-    return _known(name.partition(".")[0]) and name
+    from headimpact.calibration.cohort import component_names  # costs a tenth of a second: few requests name one
+
+    key, dot, component = name.partition(".")
+    components = component_names(_known(key))
+    if dot and component not in components:
+        raise ValueError(f"The coefficients of {key} are: {', '.join(components)}.")
+    return name
 
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_rising)]

@@ -198,7 +198,7 @@ def _labelled(call: Call, line: LabelLine, conn: Any) -> dict[str, Any]:  # noqa
     impact_id, fault = None, line.said if isinstance(line.said, Problem) else None
     if fault is None:
         impact_id = _find(call, line, conn)
-        fault = None if impact_id is not None else not_found("impact")
+        fault = not_found("impact") if impact_id is None else _contradiction(call, line, impact_id, conn)
     if fault is not None or impact_id is None or not isinstance(line.said, LabelBody):
         return row | {"status": "failed", "problem": None if fault is None else fault.as_dict()}
     _, news = labels.put(conn, call.data_set_id, impact_id, said(line.said), call.key.id)
@@ -214,6 +214,14 @@ def _find(call: Call, line: LabelLine, conn: Any) -> bytes | None:  # noqa: ANN4
         return labels.find_impact(conn, call.data_set_id, external_id=line.external_id)
     known = ids.decode("imp", line.impact_id)
     return None if known is None else labels.find_impact(conn, call.data_set_id, impact_id=known)
+
+
+def _contradiction(call: Call, line: LabelLine, found: bytes, conn: Any) -> Problem | None:  # noqa: ANN401 - a connection of the store
+    """What is wrong with a line whose two names are not of one impact: a column has slipped."""
+    named = line.impact_id is not None and line.external_id is not None
+    if named and found != labels.find_impact(conn, call.data_set_id, external_id=line.external_id):
+        return Problem("invalid-payload", "The line's impact_id and external_id are not of one impact.")
+    return None
 
 
 def said(body: LabelBody) -> NewLabel:

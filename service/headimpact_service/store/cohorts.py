@@ -38,6 +38,7 @@ class LabelledImpact:
     event: str | None
     context: Mapping[str, Any] | None
     device: str | None
+    occurred_at: datetime | None
     values: tuple[float | None, ...]
 
 
@@ -57,6 +58,7 @@ _LABELLED = (
         labels.c.event,
         impacts.c.context,
         func.coalesce(devices.c.model, "") + " " + func.coalesce(devices.c.firmware, ""),
+        impacts.c.occurred_at,
         *(scores.c[name] for name in VALUE_COLUMNS),
     )
     .select_from(
@@ -70,7 +72,7 @@ _LABELLED = (
 )
 _COUNT = select(func.count()).select_from(_JOINED).where(*_LIVE)
 _IDS = select(impacts.c.id, impacts.c.revision).select_from(_JOINED).where(*_LIVE).order_by(impacts.c.id)
-_FIRST_VALUE = 8
+_FIRST_VALUE = 9
 
 
 def labelled(conn: Connection, data_set_id: bytes, wanted: CohortFilter) -> list[LabelledImpact]:
