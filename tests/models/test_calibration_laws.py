@@ -12,7 +12,7 @@ import statsmodels.api as sm
 from scipy.special import expit
 
 from headimpact.calibration import RefitOptions, fitted_model, make_cohort, refit, report_document
-from headimpact.calibration.agreement import agreement, shift, slopes_on
+from headimpact.calibration.agreement import agreement, recalibration, shift, slopes_on
 from headimpact.calibration.cohort import Cohort
 from headimpact.calibration.discrimination import auc, curve, delong_test, resampled
 from headimpact.calibration.drift import group_shifts, risk_adjusted_cusum
@@ -48,6 +48,17 @@ def cohort_of(seed: int = 1, n: int = 400) -> Cohort:
     bric = bam.sum(axis=1, keepdims=True) * generator.lognormal(0, 0.3, (n, 1))
     outcome = (generator.random(n) < expit(-5 + bam @ np.array([18.0, 12.0, 20.0]))).astype(float)
     return make_cohort(outcome, [f"a{i % 40:02}" for i in range(n)], {"bam": bam, "bric": bric})
+
+
+def test_a_recalibration_that_is_separated_is_none_and_no_error() -> None:
+    """Scores so far apart that every probability rounds to 0 or 1: the information is singular."""
+    y = np.repeat([0.0, 1.0], 30)
+    for spread in (1.0, 10.0, 1e3, 1e6):
+        eta = np.where(y > 0, spread, -spread) + np.linspace(-0.1, 0.1, 60)
+        assert recalibration(y, eta) is None
+        assert recalibration(y, eta, np.full(60, 0.3)) is None
+        found = agreement(y, np.clip(expit(eta), 1e-300, 1 - 1e-16))
+        assert (found.intercept, found.slope, found.covariance) == (None, None, None)
 
 
 class TestFits:

@@ -193,6 +193,8 @@ class TestFit:
             ({"criteria": []}, "/criteria"),
             ({"incidence": 0}, "/incidence"),
             ({"incidence_range": [0.5, 0.1]}, "/incidence_range"),
+            ({"incidence": 0.5, "incidence_range": [0.001, 0.01]}, ""),
+            ({"cohort": {"occurred_from": "2026-10-01T00:00:00Z", "occurred_to": "2026-09-01T00:00:00Z"}}, "/cohort"),
             ({"replicas": 10001}, "/replicas"),
             ({"folds": 1}, "/folds"),
             ({"seed": -1}, "/seed"),
@@ -375,6 +377,8 @@ class TestSchedules:
             ({"gates": {"calibration_slope": [2, 1]}}, "/gates/calibration_slope"),
             ({"gates": {"expected_over_observed": [1.25, 0.8]}}, "/gates/expected_over_observed"),
             ({"gates": {"waive_lowering": ["foo.q"]}}, "/gates/waive_lowering/0"),
+            ({"gates": {"waive_lowering": ["bam.w"]}}, "/gates/waive_lowering/0"),
+            ({"gates": {"waive_lowering": ["hic15+bric.x"]}}, "/gates/waive_lowering/0"),
         ],
     )
     def test_a_schedule_that_cannot_be_is_refused(self, api: Api, fields: dict[str, Any], pointer: str) -> None:

@@ -242,6 +242,15 @@ class TestTables:
         assert (found.status_code, found.json()["type"]) == (422, "/problems/unreadable-file")
         assert told in found.json()["detail"]
 
+    def test_a_line_whose_two_names_are_not_of_one_impact_labels_neither(self, api: Api) -> None:
+        first, second = (api.create(name)["id"] for name in ("e-1", "e-2"))
+        said = "concussion,physician_diagnosis"
+        table = f"external_id,impact_id,outcome,basis\ne-1,{second},{said}\ne-1,{first},{said}\nnone,{second},{said}\n"
+        found = self.send(api, table).json()
+        assert [row["status"] for row in found["data"]] == ["failed", "labelled", "failed"]
+        assert "not of one impact" in found["data"][0]["problem"]["detail"]
+        assert api.get(f"/v1/impacts/{second}/label").status_code == 404
+
     def test_a_line_with_other_cells_is_told(self, api: Api) -> None:
         found = self.send(api, "external_id,outcome,basis\ne-1,no_concussion\n")
         assert "2 cells where the table has 3" in found.json()["data"][0]["problem"]["detail"]

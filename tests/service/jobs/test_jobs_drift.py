@@ -1,0 +1,46 @@
+"""Drift: the active model against a cohort, as its impacts happened."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from headimpact.calibration.drift import risk_adjusted_cusum
+from headimpact.risk import LAKSARI_2020
+from headimpact_service.intake.cohorts import Selected
+from headimpact_service.intake.drift import drift_document
+from headimpact_service.store.cohorts import LabelledImpact
+from headimpact_service.store.tables import CRITERION_COLUMNS, VALUE_COLUMNS
+
+START = datetime(2026, 9, 1, tzinfo=UTC)
+
+
+def impacts(count: int) -> tuple[list[LabelledImpact], list[float]]:
+    """Impacts a day apart: harmless at first, later with more concussions than the model says."""
+    generator = np.random.default_rng(4)
+    found, outcomes = [], []
+    first = VALUE_COLUMNS.index(CRITERION_COLUMNS["bam"][0])
+    for number in range(count):
+        values: list[float | None] = [1.0] * len(VALUE_COLUMNS)
+        values[first : first + 3] = (generator.gamma(1.5, 0.04, 3)).tolist()
+        when = START + timedelta(days=number)
+        found.append(
+            LabelledImpact(number.to_bytes(16, "big"), 1, None, None, "", None, None, None, when, tuple(values))
+        )
+        outcomes.append(float(number > count / 2 and generator.random() < 0.3))
+    return found, outcomes
+
+
+def test_the_chart_goes_with_time_whatever_the_order_of_arrival() -> None:
+    found, outcomes = impacts(120)
+    in_time = drift_document(Selected(found, outcomes, {}), LAKSARI_2020, 0.0055)
+    order = np.random.default_rng(1).permutation(120).tolist()
+    shuffled = drift_document(
+        Selected([found[i] for i in order], [outcomes[i] for i in order], {}), LAKSARI_2020, 0.0055
+    )
+    assert in_time is not None
+    assert shuffled == in_time
+    backwards = risk_adjusted_cusum(np.array(outcomes)[::-1], np.full(120, np.mean(outcomes)))
+    forwards = risk_adjusted_cusum(np.array(outcomes), np.full(120, np.mean(outcomes)))
+    assert backwards.values[-1] != forwards.values[-1]  # the order does matter
