@@ -37,7 +37,7 @@ _WITH_BODY = (
     "invalid-payload",
 )
 _HEADER_SCHEMAS = {
-    "If-Match": {"type": "string", "pattern": r'^("[1-9][0-9]{0,8}"|\*)$'},
+    "If-Match": {"type": "string", "pattern": r'^("(0|[1-9][0-9]{0,8})"|\*)$'},
     "Idempotency-Key": {"type": "string", "pattern": r"^[!-~]{1,200}$"},
     "Prefer": {"type": "string", "enum": ["respond-async"]},
 }

@@ -126,7 +126,8 @@ class SignalBody(Strict):
     )
     x: Components | None = Field(
         None,
-        description="Samples along (or about) x, forward. Null only outside a constrained plane.",
+        description="Samples along (or about) x, forward. Null only outside a constrained plane; a null "
+        "sample is a gap, which `fill_gaps` fills.",
         examples=[[0.1, 3.2, 0.4]],
     )
     y: Components | None = Field(None, description="Samples along (or about) y.", examples=[[0.0, -1.1, 0.2]])
@@ -257,7 +258,7 @@ class Kinematics(Strict):
         ge=0.0,
         le=60_000.0,
         description="From the first sample to the trigger [ms]; null: not known. Where it is absent and `time_ms` "
-        "goes from below zero to above, zero is the trigger.",
+        "goes from below zero to zero or above, zero is the trigger.",
         examples=[10],
     )
     filter: Filter = Field("paper", description="`paper` is 300 Hz on acceleration and 184 Hz on angular velocity.")
