@@ -19,8 +19,8 @@ from headimpact_service.store.jobs import Job
 
 LOCATION = {"Location": "The job's address."}
 IDEMPOTENCY_KEY = {
-    "Idempotency-Key": "Your name for a request that becomes a job: sent again with the same request it answers the same "
-    "job, with another it is 409. 1 to 200 visible ASCII characters."
+    "Idempotency-Key": "Your name for a request that becomes a job: sent again with the same request it answers the "
+    "same job, with another it is 409. 1 to 200 visible ASCII characters."
 }
 PREFER = {"Prefer": "`respond-async` makes a job of a small file too."}
 
