@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, curve_fault
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
@@ -195,9 +196,9 @@ class _Data:
         if code is None:
             return None
         read = partial(self._curve, code, index)
-        return HeadChannel(code, self.named(index), read, self._filtering(index, code), points=self._points(index))
+        return HeadChannel(code, self.named(index), read, self._filtering(index, code), points=self.points(index))
 
-    def _points(self, index: int) -> float | None:
+    def points(self, index: int) -> float | None:
         """How many samples the header says that a channel has: in all, or before and after the trigger."""
         said = [self.header.of_channel(key, index) for key in ("points", "before", "after")]
         points, before, after = (float(cell) if _NUMBER.fullmatch(cell) else None for cell in said)
@@ -269,5 +270,14 @@ def _mapped(data: _Data, options: ImportOptions) -> Iterator[ImpactRecord | Prob
         known["pre_trigger_ms"] = round(data.points_before / data.rate * 1000.0, 9)
     given = {name: value for name, value in known.items() if name not in asked.model_fields_set}
     mapping = asked.model_copy(update=given)
-    table = _Channels(data)
-    return read_table(table, replace(options, preset=None, mapping=mapping), format_name="dts")
+    notes = tuple(_of_other_length(data))
+    for item in read_table(_Channels(data), replace(options, preset=None, mapping=mapping), format_name="dts"):
+        yield replace(item, notes=(*notes, *item.notes)) if isinstance(item, ImpactRecord) else item
+
+
+def _of_other_length(data: _Data) -> Iterator[QualityNote]:
+    """A note if the file has not the samples that its header says, of whatever channels."""
+    said = {points for index in range(data.channels) if (points := data.points(index)) is not None}
+    if said and said != {float(len(data.rows))}:
+        detail = f"The file has {len(data.rows)} samples where its header says {max(said):g}."
+        yield QualityNote("sample_count_mismatch", "warning", detail)

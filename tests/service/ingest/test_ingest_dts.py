@@ -103,8 +103,11 @@ def test_channels_without_iso_codes_are_read_with_a_mapping_by_their_names():
             "angular_velocity": {"unit": "deg/s", "x": "X2", "y": "X1", "z": "X0"},
         }
     )
+    [short] = read(dts(plain, changes={"Number of Pts (Total)": [4000] * 6}), mapping=mapping)
+    assert [(note.code, note.signal) for note in short.notes] == [("sample_count_mismatch", None)]
     for named in (None, "dts"):
         record = one(file, mapping=mapping, preset=named)
+        assert record.notes == ()
         assert peaks(record, "angular_velocity") == pytest.approx(EXPECTED["angular_velocity"])
         assert (record.recording.axes, record.recording.pre_trigger_ms) == ("sae_j211", 0.5)
 
