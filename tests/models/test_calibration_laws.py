@@ -50,6 +50,34 @@ def cohort_of(seed: int = 1, n: int = 400) -> Cohort:
     return make_cohort(outcome, [f"a{i % 40:02}" for i in range(n)], {"bam": bam, "bric": bric})
 
 
+@pytest.mark.parametrize("method", [fit, fit_firth])
+@pytest.mark.parametrize(("events", "p", "fits"), [(1, 1, False), (2, 1, True), (3, 3, False), (4, 3, True)])
+def test_a_fit_needs_as_many_of_each_outcome_as_it_has_coefficients(method, events: int, p: int, fits: bool) -> None:
+    generator = np.random.default_rng(7)
+    x = generator.normal(size=(80, p))
+    for few in (events, 80 - events):
+        y = np.zeros(80)
+        y[generator.permutation(80)[:few]] = 1.0
+        if fits:
+            method(Sample(y, x))
+            continue
+        with pytest.raises(CalibrationError, match=f"to fit {p + 1} coefficients") as raised:
+            method(Sample(y, x))
+        assert raised.value.code == "too-few-events"
+
+
+@pytest.mark.parametrize(("share", "n"), [(0.93, 300), (0.5, 400), (0.005, 20_000)])
+def test_the_interval_of_expected_over_observed_is_that_of_a_binomial_count(share: float, n: int) -> None:
+    """Of equal probabilities: the count's standard deviation over its mean, on the scale of logarithms."""
+    events = round(share * n)
+    y = np.repeat([1.0, 0.0], [events, n - events])
+    found = agreement(y, np.full(n, share))
+    low, high = found.expected_over_observed_interval()
+    deviation = np.sqrt(n * share * (1.0 - share)) / events
+    assert found.expected_over_observed == pytest.approx(1.0, abs=1e-12)
+    assert (low, high) == pytest.approx((np.exp(-1.959964 * deviation), np.exp(1.959964 * deviation)), rel=1e-6)
+
+
 def test_a_recalibration_that_is_separated_is_none_and_no_error() -> None:
     """Scores so far apart that every probability rounds to 0 or 1: the information is singular."""
     y = np.repeat([0.0, 1.0], 30)

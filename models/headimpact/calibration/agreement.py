@@ -35,6 +35,8 @@ class Agreement:
         Of these two, 2 x 2.
     in_the_large
         The intercept with the slope held at 1, and its standard error.
+    expected_gain
+        By how much the logarithm of `expected` grows with that intercept: near 1 while events are rare.
     """
 
     observed: float
@@ -45,6 +47,7 @@ class Agreement:
     slope: float | None
     covariance: FloatArray | None
     in_the_large: tuple[float, float]
+    expected_gain: float
 
     @property
     def expected_over_observed(self) -> float:
@@ -52,8 +55,8 @@ class Agreement:
         return self.expected / self.observed
 
     def expected_over_observed_interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Of E:O, log-normal by the standard error of the calibration in the large."""
-        half = float(norm.ppf(0.5 + level / 2)) * self.in_the_large[1]
+        """Of E:O, log-normal by the standard error of the calibration in the large, taken to the logarithm of E."""
+        half = float(norm.ppf(0.5 + level / 2)) * self.in_the_large[1] * self.expected_gain
         return self.expected_over_observed * float(np.exp(-half)), self.expected_over_observed * float(np.exp(half))
 
 
@@ -90,6 +93,7 @@ def agreement(y: FloatArray, p: FloatArray, weights: FloatArray | None = None) -
         slope,
         covariance,
         shift(y, eta, weights),
+        float((w * p * (1.0 - p)).sum() / (w * p).sum()),
     )
 
 

@@ -149,7 +149,8 @@ def fit(sample: Sample, weights: FloatArray | None = None) -> LogisticFit:
     Raises
     ------
     CalibrationError
-        There are no events, nothing but events, or predictors that are constant or repeat each other.
+        There are no events, nothing but events, fewer of either than coefficients, or predictors that are constant or
+        repeat each other.
     """
     require_fittable(sample)
     w = np.ones((sample.n, 1)) if weights is None else weights[:, None]
@@ -172,6 +173,13 @@ def require_fittable(sample: Sample) -> None:
         raise CalibrationError("no-events", "No impact has the outcome concussion.")
     if sample.events == sample.n:
         raise CalibrationError("no-non-events", "Every impact has the outcome concussion.")
+    needed, others = sample.design.shape[1], sample.n - sample.events
+    if min(sample.events, others) < needed:
+        raise CalibrationError(
+            "too-few-events",
+            f"Concussions: {sample.events}, other impacts: {others}; to fit {needed} coefficients, {needed} of each "
+            "are needed at least.",
+        )
     constant = np.flatnonzero((sample.x == sample.x[0]).all(axis=0)).tolist()
     if constant:
         of_which = "" if sample.x.shape[1] == 1 else f" number {constant[0] + 1}"
