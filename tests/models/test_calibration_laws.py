@@ -426,6 +426,17 @@ class TestFittedModels:
             assert achieved.specificity == pytest.approx(point.specificity)
             assert point.basis == "cohort"
 
+    def test_a_served_threshold_has_the_interval_of_its_report(self) -> None:
+        done = refit(cohort_of(), RefitOptions(replicas=10, sensitivity_targets=(0.5, 0.8, 0.9)))
+        model = fitted_model(done, "small-2")
+        reported = report_document(done)["criteria"]["bam"]["served_thresholds"]
+        for target, row in zip((0.5, 0.8, 0.9), reported, strict=True):
+            point = resolve_operating_point(OperatingPointRequest("bam", sensitivity=target), model)
+            assert point.threshold == pytest.approx(row["probability"], rel=1e-12)
+            assert point.threshold_interval is not None
+            for found, expected in zip(point.threshold_interval, row["probability_interval"], strict=True):
+                assert found == (None if expected is None else pytest.approx(expected, rel=1e-12))
+
     @pytest.mark.parametrize(
         ("change", "pointer"),
         [

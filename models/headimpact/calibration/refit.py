@@ -240,13 +240,17 @@ def _curve(one: CriterionRefit) -> RiskCurve:
 
 
 def _known_points(one: CriterionRefit, level: float) -> tuple[KnownPoint, ...]:
-    """The threshold of every sensitivity that the cohort's events can show, at the served coefficients."""
+    """The threshold of every sensitivity that the cohort's events can show, at the served coefficients.
+
+    The threshold of a sensitivity that the fit was asked for has the interval of that sensitivity, as its report has.
+    """
     y, served = one.sample.y, one.served
+    asked = {threshold.value: threshold.bounds for threshold in one.served_thresholds}
     thresholds = np.unique(served[y == 1.0])[::-1]
     points = []
     for value in thresholds.tolist():
         achieved = confusion(y, served, value)
-        bounds = order_statistic_interval(y, served, achieved.sensitivity, level)
+        bounds = asked.get(value) or order_statistic_interval(y, served, achieved.sensitivity, level)
         points.append(
             KnownPoint(
                 sensitivity=achieved.sensitivity,
