@@ -109,6 +109,10 @@ def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
     return values
 
 
+def _count(rows: Rows) -> int:
+    return rows.stop - rows.start if isinstance(rows, slice) else len(rows)
+
+
 class TableImpact:
     """One impact of a table."""
 
@@ -200,7 +204,9 @@ class TableImpact:
     def _tracks(self) -> list[Track]:
         """The rows of each signal: all of the impact's, unless these are parted by time base."""
         if self.layout.time_base is None:
-            return [self._track(name, self.rows, self.reading) for name in self._present()]
+            whole = [self._track(name, self.rows, self.reading) for name in self._present()]
+            self._note_end(whole)
+            return whole
         tracks: list[Track] = []
         for rows in self._parts(self.layout.time_base):
             reading = self._reading_at(rows.start if isinstance(rows, slice) else rows[0])
@@ -214,6 +220,17 @@ class TableImpact:
         if not tracks:
             raise label_fault("The impact has no samples.", "no-signal")
         return tracks
+
+    def _note_end(self, tracks: list[Track]) -> None:
+        """Say so where an array of impacts goes on behind the last sample of all signals of this one."""
+        if not self.samples.has_ends:
+            return
+        left_out = _count(self.rows) - max(_count(track.rows) for track in tracks)
+        if left_out > 0:
+            detail = (
+                f"The last {left_out} of the impact's {_count(self.rows)} rows hold no sample: its record ends before."
+            )
+            self.notes.append(QualityNote("sample_count_mismatch", "note", detail))
 
     def _present(self) -> list[SignalName]:
         """The signals of the impact: one without any sample is not there."""
@@ -321,7 +338,7 @@ class TableImpact:
         dropped = self.mapping.drop_rows or 0
         if not dropped:
             return track
-        if not self.notes:
+        if not any(note.code == "edge_glitch" for note in self.notes):
             detail = f"The first {dropped} of the file's samples were left out, as its layout says."
             self.notes.append(QualityNote("edge_glitch", "note", detail))
         rows = track.rows

@@ -92,6 +92,20 @@ def test_an_element_of_a_struct_that_lacks_a_signal_takes_it_from_no_other(absen
     assert [name for name, _ in lacking.recording.signals()] == ["linear_acceleration"]
 
 
+def test_where_an_array_goes_on_behind_an_impacts_last_sample_is_noted() -> None:
+    values = np.stack([six_axis(), six_axis() / 2])
+    values[1, 30:] = np.nan
+    dropped = Mapping.model_validate({"drop_rows": 1})
+    whole, shorter = records(mat({"impacts": values}), preset="stanford_mat", mapping=dropped)
+    assert [note.code for note in whole.notes] == ["edge_glitch"]
+    assert [(note.code, note.severity) for note in shorter.notes] == [
+        ("sample_count_mismatch", "note"),
+        ("edge_glitch", "note"),
+    ]
+    assert "last 10 of the impact's 40 rows" in shorter.notes[0].detail
+    assert shorter.recording.linear_acceleration.values.shape == (29, 3)
+
+
 def sheet(rows: np.ndarray, *headings: str) -> list[list[Any]]:
     return [list(headings), *rows.tolist()]
 
