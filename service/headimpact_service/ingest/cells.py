@@ -18,13 +18,17 @@ NOTHING = frozenset({"", "-", ".", "na", "n/a", "#n/a", "nan", "nat", "null", "m
 
 Not `none`: that is a filter.
 """
-NO_NUMBER = NOTHING | {"none"}
 
 
 def said(cell: str) -> str:
     """A cell without the blanks around it; empty where it holds nothing."""
     text = cell.strip()
     return "" if text.lower() in NOTHING else text
+
+
+def is_no_number(cell: str) -> bool:
+    """Whether a cell among numbers holds nothing, rather than something that is none."""
+    return said(cell).lower() in {"", "none"}
 
 
 def number_text(value: float) -> str:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.cells import NO_NUMBER, LineCells
+from headimpact_service.ingest.cells import LineCells, is_no_number
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
@@ -166,7 +166,7 @@ class CsvTable:
         """The number in a cell; NaN where there is none, infinite where something else stands."""
         comma = _NUMBER.fullmatch(cell) is None
         if comma and _DECIMAL_COMMA.fullmatch(cell) is None:
-            return float("nan" if cell.strip().lower() in NO_NUMBER else "inf")
+            return float("nan" if is_no_number(cell) else "inf")
         if comma and not self._decimal_commas:
             return self._unclear(
                 "Whether commas in the file's numbers are decimal or group thousands is not clear: write them with a "

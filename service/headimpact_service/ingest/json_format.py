@@ -10,7 +10,7 @@ from pydantic_core import from_json
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.impact_json import MAX_NAME, FileImpactBody
 from headimpact_service.ingest.impact_reading import to_record
-from headimpact_service.ingest.json_faults import parse, require_bounded
+from headimpact_service.ingest.json_faults import require_bounded, validated
 from headimpact_service.ingest.json_items import items
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
@@ -55,7 +55,7 @@ def read_impact_text(text: bytes, options: ImportOptions, what: str) -> ImpactRe
         require_bounded(text, what)
     except Problem as problem:
         raise Problem("unreadable-file", problem.detail) from None
-    body = parse(text, FileImpactBody, what=what)
+    body = validated(text, FileImpactBody, what=what)
     return with_options(to_record(body, time_zone=options.time_zone, what=what), options)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from headimpact.published import QUALITY_LIMITS
 from headimpact.stamps import rate_said, rounding_s
 
 FloatArray = NDArray[np.float64]
@@ -15,7 +16,7 @@ ROUNDED_TO_MS = (1.0, 0.1, 0.01)
 """What stamps are written to."""
 NEAR, DRIFT = 0.6, 0.02
 """How far a stamp may be from where a stated rate has its sample: in samples, and by what went by since the first."""
-UNIFORM_JITTER = 1e-6
+UNIFORM_JITTER: float = QUALITY_LIMITS["record"]["uniform_jitter"]
 """Of the step: stamps that stray less from a straight line are rounded, not jittered."""
 
 

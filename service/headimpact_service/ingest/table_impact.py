@@ -109,8 +109,8 @@ def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
     return values
 
 
-def _count(rows: Rows) -> int:
-    return rows.stop - rows.start if isinstance(rows, slice) else len(rows)
+def _numbers_of(rows: Rows) -> Sequence[int]:
+    return range(rows.start, rows.stop) if isinstance(rows, slice) else rows
 
 
 class TableImpact:
@@ -123,6 +123,8 @@ class TableImpact:
         window = samples.window
         self.rows = window.impacts[number]
         self.first = self.rows.start if isinstance(self.rows, slice) else self.rows[0]
+        self.row = window.first + self.first
+        """Which row of the table is its first."""
         self.cell = self.first if window.columns.lengths is None else number
         self.notes: list[QualityNote] = []
 
@@ -225,11 +227,10 @@ class TableImpact:
         """Say so where an array of impacts goes on behind the last sample of all signals of this one."""
         if not self.samples.has_ends:
             return
-        left_out = _count(self.rows) - max(_count(track.rows) for track in tracks)
+        count = len(_numbers_of(self.rows))
+        left_out = count - max(len(_numbers_of(track.rows)) for track in tracks)
         if left_out > 0:
-            detail = (
-                f"The last {left_out} of the impact's {_count(self.rows)} rows hold no sample: its record ends before."
-            )
+            detail = f"The last {left_out} of the impact's {count} rows hold no sample: its record ends before."
             self.notes.append(QualityNote("sample_count_mismatch", "note", detail))
 
     def _present(self) -> list[SignalName]:
@@ -245,7 +246,7 @@ class TableImpact:
         if self.samples.window.columns.lengths is not None:
             yield self.rows
             return
-        rows = range(self.rows.start, self.rows.stop) if isinstance(self.rows, slice) else self.rows
+        rows = _numbers_of(self.rows)
         texts = cells[self.rows] if isinstance(self.rows, slice) else [cells[row] for row in rows]
         for _, run in groupby(zip(rows, texts, strict=True), key=lambda pair: pair[1].strip()):
             part = [row for row, _ in run]
@@ -260,9 +261,7 @@ class TableImpact:
         if signal.clock is not None or signal.sample_rate_hz is not None or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         if clock is None:
-            return self._counted(
-                Track(name, rows, rate or signal.sample_rate_hz or self.mapping.sample_rate_hz, None, 1.0)
-            )
+            return self._counted(Track(name, rows, rate or self.mapping.sample_rate_hz, None, 1.0))
         return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
 
     def _said_rate(self, reading: Reading, clock: Clock | None, rows: Rows) -> float | None:
@@ -309,14 +308,14 @@ class TableImpact:
         if column is None:
             return
         numbers = self.samples.numbers[column][self.rows]
-        self.samples.require_finite([column], self.rows, self.samples.window.first + self.first)
+        self.samples.require_finite([column], self.rows, self.row)
         steps = np.diff(numbers)
         stray = np.flatnonzero(steps <= 0 if allow_gaps else steps != 1)
         if stray.size:
             before, after = numbers[stray[0] : stray[0] + 2].tolist()
             raise label_fault(
                 f"Sample {after:g} follows sample {before:g} in the impact that begins in row "
-                f"{self.samples.window.first + self.first + 1} below the headings: some are missing or out of order.",
+                f"{self.row + 1} below the headings: some are missing or out of order.",
                 "sample-order",
             )
 
@@ -331,7 +330,7 @@ class TableImpact:
         self._require_finite(self.layout.signals[track.name].columns, track)
 
     def _require_finite(self, columns: list[int], track: Track) -> None:
-        self.samples.require_finite(columns, track.rows, self.samples.window.first + self.first)
+        self.samples.require_finite(columns, track.rows, self.row)
 
     def _without_first(self, track: Track) -> Track:
         """A track without the samples that the layout calls corrupt, which is noted once."""
@@ -349,8 +348,8 @@ class TableImpact:
     def _pre_trigger_ms(self, tracks: list[Track], kept: list[Track]) -> float | None:
         """The time before the trigger: as said for this impact or by the sender, by the stamps, or by the layout."""
         if "pre_trigger_ms" in self.layout.reading:  # an empty cell says that it is not known
-            said = self.reading.pre_trigger_ms
-            return self.mapping.pre_trigger_ms if said is None else said
+            told = self.reading.pre_trigger_ms
+            return self.mapping.pre_trigger_ms if told is None else told
         stated = self.mapping.pre_trigger_ms
         if stated is not None:
             stated = max(0.0, round(stated - self._dropped_ms(tracks, kept), 9))
@@ -410,7 +409,7 @@ class TableImpact:
     def _require_one_time(self, columns: Sequence[int]) -> None:
         """Times that go on from sample to sample are those of the samples; others are of several impacts."""
         texts = [self.samples.texts[column] for column in columns]
-        rows = range(self.rows.start, self.rows.stop) if isinstance(self.rows, slice) else self.rows
+        rows = _numbers_of(self.rows)
         told = dict.fromkeys(tuple(said(cells[row]) for cells in texts) for row in rows)
         moments = [moment(list(parts), self.options.time_zone) for parts in told if all(parts)]
         known = [when for when in moments if when is not None]
@@ -419,7 +418,7 @@ class TableImpact:
 
     def _several(self, what: str) -> Problem:
         return label_fault(
-            f"{what} in all rows of the impact that begins in row {self.samples.window.first + self.first + 1} below "
+            f"{what} in all rows of the impact that begins in row {self.row + 1} below "
             "the headings: if they are several impacts, tell them apart by a column impact_id or a mapping's group_by.",
             "several-impacts",
         )

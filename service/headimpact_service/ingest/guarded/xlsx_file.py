@@ -10,14 +10,14 @@ import datetime as dt
 import io
 import re
 import zipfile
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import numpy as np
 from python_calamine import CalamineSheet, CalamineWorkbook, SheetTypeEnum
 
-from headimpact_service.ingest.cells import NO_NUMBER, NOTHING, number_text
+from headimpact_service.ingest.cells import is_no_number, number_text, said
 from headimpact_service.ingest.guarded.contents import (
     Content,
     NamedTable,
@@ -152,11 +152,7 @@ def _blocks(sheet: CalamineSheet) -> list[_Block]:
 
 def _holds_nothing(row: Row) -> bool:
     """A row of lost samples, if more samples follow: the end of a block, if they do not."""
-    return all(_is_nothing(cell, NOTHING) for cell in row)
-
-
-def _is_nothing(cell: Any, words: Collection[str]) -> bool:  # noqa: ANN401 - any cell
-    return cell is None or (isinstance(cell, str) and cell.strip().lower() in words)
+    return all(cell is None or (isinstance(cell, str) and not said(cell)) for cell in row)
 
 
 def _named_columns(row: Row) -> list[int]:
@@ -179,7 +175,7 @@ def _number(cell: Any) -> float:  # noqa: ANN401 - any cell
         return float(cell)
     if isinstance(cell, str) and _NUMBER.fullmatch(cell):
         return float(cell)
-    return float("nan" if _is_nothing(cell, NO_NUMBER) else "inf")
+    return float("nan" if cell is None or (isinstance(cell, str) and is_no_number(cell)) else "inf")
 
 
 def _text(cell: Any) -> str:  # noqa: ANN401 - any cell
