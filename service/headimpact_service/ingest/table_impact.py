@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -19,7 +19,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
 from headimpact_service.ingest.formula_cells import unguarded
-from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES, MIN_RATE_HZ
+from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass, mounting
 from headimpact_service.ingest.labels import (
     NOTHING_SAID,
@@ -34,14 +34,12 @@ from headimpact_service.ingest.layout import Clock, Layout, SignalLayout
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.stamps import before_zero_ms, follows
 from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
-from headimpact_service.ingest.windows import Rows, Window
-
-ROUNDED_TO_S = 1.0
-"""Times of samples may be written to the second."""
+from headimpact_service.ingest.windows import Rows, Window, numbers_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +107,6 @@ def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
     return values
 
 
-def _numbers_of(rows: Rows) -> Sequence[int]:
-    return range(rows.start, rows.stop) if isinstance(rows, slice) else rows
-
-
 class TableImpact:
     """One impact of a table."""
 
@@ -122,17 +116,18 @@ class TableImpact:
         self.mapping, self.options = plan.mapping, plan.options
         window = samples.window
         self.rows = window.impacts[number]
-        self.first = self.rows.start if isinstance(self.rows, slice) else self.rows[0]
-        self.row = window.first + self.first
+        first = self.rows.start if isinstance(self.rows, slice) else self.rows[0]  # of no rows, too
+        self.row = window.first + first
         """Which row of the table is its first."""
-        self.cell = self.first if window.columns.lengths is None else number
+        self.cell = first if window.columns.lengths is None else number
+        alike = samples.are_alike(self.rows)
+        self.labels = RowLabels(self.layout, samples.texts, self.rows, self.cell, self.row, alike)
         self.notes: list[QualityNote] = []
 
     def record(self) -> ImpactRecord:
         """The impact, with what the sender gave beside the file in place of what the file says."""
         options, named = self.options, self.plan.named
-        if not self.samples.are_alike(self.rows):
-            self._require_one_impact()
+        self.labels.require_one_impact(options)
         unscorable = self._text(self.layout.unscorable)
         recording = self._recording(scorable=unscorable is None)
         return ImpactRecord(
@@ -158,7 +153,7 @@ class TableImpact:
     @cached_property
     def reading(self) -> Reading:
         """What the impact's rows say of how to read it."""
-        return self._reading((field, self._said(column)) for field, column in self.layout.reading.items())
+        return self._reading((field, self.labels.said(column)) for field, column in self.layout.reading.items())
 
     def _reading_at(self, cell: int) -> Reading:
         """The same of one part of an impact."""
@@ -227,8 +222,8 @@ class TableImpact:
         """Say so where an array of impacts goes on behind the last sample of all signals of this one."""
         if not self.samples.has_ends:
             return
-        count = len(_numbers_of(self.rows))
-        left_out = count - max(len(_numbers_of(track.rows)) for track in tracks)
+        count = len(numbers_of(self.rows))
+        left_out = count - max(len(numbers_of(track.rows)) for track in tracks)
         if left_out > 0:
             detail = f"The last {left_out} of the impact's {count} rows hold no sample: its record ends before."
             self.notes.append(QualityNote("sample_count_mismatch", "note", detail))
@@ -246,7 +241,7 @@ class TableImpact:
         if self.samples.window.columns.lengths is not None:
             yield self.rows
             return
-        rows = _numbers_of(self.rows)
+        rows = numbers_of(self.rows)
         texts = cells[self.rows] if isinstance(self.rows, slice) else [cells[row] for row in rows]
         for _, run in groupby(zip(rows, texts, strict=True), key=lambda pair: pair[1].strip()):
             part = [row for row, _ in run]
@@ -384,49 +379,10 @@ class TableImpact:
             self.notes += check_reported_resultant(track.name, layout.unit, reported, values)
         return Signal(values, layout.unit, *base, layout.full_scale)
 
-    def _require_one_impact(self) -> None:
-        """Refuse rows that say different things of their impact: they are several, and nothing tells them apart."""
-        for column in self.layout.labels:
-            if len([cell for cell in self._distinct(column) if cell]) > 1:
-                raise self._several(f"Column {column + 1} does not say the same")
-        columns = [] if self.options.occurred_at is not None else self.layout.occurred_at
-        if any(len(self._distinct(column)) > 1 for column in columns):
-            self._require_one_time(columns)
-
-    def _said(self, column: int) -> str:
-        """What the impact's first row says in a column, or where that says nothing, the first that does."""
-        text = said(self.samples.texts[column][self.cell])
-        if text or self.samples.are_alike(self.rows):
-            return text
-        return next(filter(None, self._distinct(column)), "")
-
-    def _distinct(self, column: int) -> list[str]:
-        """What the impact's rows say in a column, in their order."""
-        cells = self.samples.texts[column]
-        told = cells[self.rows] if isinstance(self.rows, slice) else map(cells.__getitem__, self.rows)
-        return list(dict.fromkeys(map(said, told)))
-
-    def _require_one_time(self, columns: Sequence[int]) -> None:
-        """Times that go on from sample to sample are those of the samples; others are of several impacts."""
-        texts = [self.samples.texts[column] for column in columns]
-        rows = _numbers_of(self.rows)
-        told = dict.fromkeys(tuple(said(cells[row]) for cells in texts) for row in rows)
-        moments = [moment(list(parts), self.options.time_zone) for parts in told if all(parts)]
-        known = [when for when in moments if when is not None]
-        if known and (max(known) - min(known)).total_seconds() > len(rows) / MIN_RATE_HZ + ROUNDED_TO_S:
-            raise self._several("The time of the impact is not the same")
-
-    def _several(self, what: str) -> Problem:
-        return label_fault(
-            f"{what} in all rows of the impact that begins in row {self.row + 1} below "
-            "the headings: if they are several impacts, tell them apart by a column impact_id or a mapping's group_by.",
-            "several-impacts",
-        )
-
     def _text(self, column: int | None) -> str | None:
         if column is None:
             return None
-        text = self._said(column)
+        text = self.labels.said(column)
         return (unguarded(text) if self.plan.format == "csv" else text) or None
 
     def _name(self, field: str, column: int | None) -> str | None:

@@ -19,6 +19,11 @@ MAX_ROWS = 200_000_000
 Rows = slice | list[int]
 
 
+def numbers_of(rows: Rows) -> Sequence[int]:
+    """The numbers of rows, one by one."""
+    return range(rows.start, rows.stop) if isinstance(rows, slice) else rows
+
+
 @dataclass(frozen=True, slots=True)
 class Window:
     """Some rows of a table and the impacts in them, in the order in which these begin; `first` is its first row."""

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from binary_files import mat, structs, xlsx
 from ingest_files import codes, read, refused, six_axis
 from making import athlete_intelligence, biocore, prevent
 
+from headimpact.errors import TraceError
+from headimpact.preparation import prepare
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
@@ -104,6 +109,17 @@ def test_where_an_array_goes_on_behind_an_impacts_last_sample_is_noted() -> None
     ]
     assert "last 10 of the impact's 40 rows" in shorter.notes[0].detail
     assert shorter.recording.linear_acceleration.values.shape == (29, 3)
+
+
+def test_an_impact_without_a_single_row_is_its_own_fault() -> None:
+    samples = [six_axis().T.tolist(), [[]] * 6]
+    names = ["ax_g", "ay_g", "az_g", "wx_rad_s", "wy_rad_s", "wz_rad_s"]
+    buffer = io.BytesIO()
+    pq.write_table(pa.table({name: [impact[i] for impact in samples] for i, name in enumerate(names)}), buffer)
+    whole, empty = read(buffer.getvalue(), sample_rate_hz=1000.0)
+    assert isinstance(whole, ImpactRecord)
+    with pytest.raises(TraceError, match="3 to 20000 samples"):
+        prepare(empty.recording)
 
 
 def sheet(rows: np.ndarray, *headings: str) -> list[list[Any]]:
