@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from headimpact.filtering import LowPass
+from headimpact.quality import QualityNote, words
 from headimpact.recording import AXES, AxesName, Recording, Signal, SignalName
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.table import FloatArray
@@ -34,7 +35,7 @@ def head_recording(
 ) -> Recording:
     """The recording that a head's channels make; time zero is the trigger.
 
-    Curves are cut to what they share: all of them if they are sampled alike, else those of each signal. An axis that a
+    The curves of a signal are cut to what they share; what signals share is found when they are scored. An axis that a
     signal lacks is no number.
 
     Raises
@@ -42,7 +43,7 @@ def head_recording(
     Problem
         422: the curves of a signal differ in rate or unit, or do not overlap.
     """
-    aligned = _aligned(signals)
+    aligned = {name: _common(curves) for name, curves in signals.items()}
     starts = {float(curves[0].stamps_s[0]) for curves in aligned.values()}
     start_s, stamped = min(starts), len(starts) > 1
     sent: dict[str, Any] = {name: _signal(curves, stamped=stamped) for name, curves in aligned.items()}
@@ -53,17 +54,6 @@ def head_recording(
         fill_gaps=fill_gaps,
         **sent,
     )
-
-
-def _aligned(signals: Curves) -> dict[SignalName, list[Curve]]:
-    if _rates_differ(signals):
-        return {name: _common(curves) for name, curves in signals.items()}
-    cut = iter(_common([curve for curves in signals.values() for curve in curves]))
-    return {name: [next(cut) for _ in curves] for name, curves in signals.items()}
-
-
-def _rates_differ(signals: Curves) -> bool:
-    return len({curve.rate for curves in signals.values() for curve in curves}) > 1
 
 
 def _common(curves: Sequence[Curve]) -> list[Curve]:
@@ -82,6 +72,28 @@ def _common(curves: Sequence[Curve]) -> list[Curve]:
         replace(curve, values=curve.values[o : o + count], stamps_s=curve.stamps_s[o : o + count])
         for curve, o in zip(curves, offsets, strict=True)
     ]
+
+
+def check_cut(signal: SignalName, curves: Sequence[Curve]) -> Iterator[QualityNote]:
+    """What the curves of one signal lose by being cut to what all of them have."""
+    for curve, kept in zip(curves, _common(curves), strict=True):
+        if kept.values.size < curve.values.size:
+            detail = (
+                f"Of the {curve.values.size} samples of the {words(signal)} on {curve.axis}, those "
+                f"{kept.values.size} are read that all its axes have."
+            )
+            yield QualityNote("sample_count_mismatch", "warning", detail, signal, curve.axis)
+            yield from _peak_cut(signal, curve, kept)
+
+
+def _peak_cut(signal: SignalName, curve: Curve, kept: Curve) -> Iterator[QualityNote]:
+    within, whole = (float(np.nanmax(np.abs(c.values), initial=0.0)) for c in (kept, curve))
+    if whole > within:
+        detail = (
+            f"The {words(signal)} on {curve.axis} is larger where not all its axes were recorded, {whole:.4g} "
+            f"{curve.unit}, than where they were, {within:.4g} {curve.unit}; only that was read."
+        )
+        yield QualityNote("peak_cut_off", "warning", detail, signal, curve.axis)
 
 
 def _on_the_same_stamps(curves: Sequence[Curve]) -> list[Curve]:

@@ -12,7 +12,7 @@ from headimpact.filtering import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant, words
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, curve_fault, head_recording
+from headimpact_service.ingest.curves import Curve, check_cut, curve_fault, head_recording
 from headimpact_service.ingest.impact_reading import low_pass
 from headimpact_service.ingest.iso_codes import RESULTANT, HeadCode
 from headimpact_service.ingest.options import ImportOptions
@@ -90,6 +90,7 @@ class _Head:
             fill_gaps=self.options.fill_gaps,
         )
         for name, signal in recording.signals():
+            self.notes += check_cut(name, found[name])
             self._require_whole(name, found[name])
             self._compare_resultant(name, signal.unit, signal.values)
         return ImpactRecord(

@@ -33,9 +33,9 @@ MAX_NAMED = 10
 
 _NUMBERED = re.compile(r"\.([0-9]{3,4})$")
 _ENDINGS = (".mme", ".chn")
-# What a header's status says of the data (ISO/TS 13499, RED A).
-_INVALID = frozenset({"channel failed", "meaningless data", "no data", "system failed"})
-_DOUBTFUL = frozenset({"questionable data", "data questionable", "questionable", "system questionable"})
+# What a header's status says of the data (ISO/TS 13499, RED A), by the word that tells.
+_INVALID = re.compile(r"fail|meaningless|no data|invalid|not valid|not ok")
+_SOUND = re.compile(r"ok|good|valid|(linearised|linearized|scaled|calculated|computed|as measured)( data)?")
 _TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "usec": 1e-6}
 _METADATA = {
     "test_number": "test number",
@@ -118,14 +118,15 @@ class _Test:
         code = head_code(header.text("channel code") or self.listed.get(number, ""))
         if code is None:
             return None
-        status = (header.text("data status") or "").casefold()
+        status = " ".join((header.text("data status") or "ok").casefold().split())
+        invalid = _INVALID.search(status) is not None
         return HeadChannel(
             code=code,
             named=_named(code, number),
             read=partial(self._curve, code, number),
             filtering=code.filtering,
-            invalid=status if status in _INVALID else None,
-            doubt=status if status in _DOUBTFUL else None,
+            invalid=status if invalid else None,
+            doubt=None if invalid or _SOUND.fullmatch(status) else status,
             points=header.number("number of samples"),
         )
 

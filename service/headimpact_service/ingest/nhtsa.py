@@ -13,10 +13,10 @@ from headimpact.filtering import PAPER
 from headimpact.quality import QualityNote
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, curve_fault, head_recording
+from headimpact_service.ingest.curves import Curve, check_cut, curve_fault, head_recording
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass
-from headimpact_service.ingest.nhtsa_header import Channel, CrashTest, Occupant, read_header
+from headimpact_service.ingest.nhtsa_header import DOUBTFUL, INVALID, SOUND, Channel, CrashTest, Occupant, read_header
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
 from headimpact_service.ingest.presets import preset_named
@@ -88,6 +88,8 @@ class _Head:
             axes=mapping.axes or "anatomical",
             low_pass=PAPER if mapping.filter is None else low_pass(mapping.filter),
         )
+        for name, curves in signals.items():
+            self.notes += check_cut(name, curves)
         return ImpactRecord(
             recording=recording,
             metadata=self._metadata(),
@@ -106,9 +108,12 @@ class _Head:
     def _curves_of(self, channels: list[Channel]) -> list[Curve]:
         """The signal's three curves, or none where one is absent; what its laboratory marked invalid is held."""
         for channel in channels:
-            if not channel.valid:
-                reason = f"Its laboratory marked {channel.named} as not valid (status {channel.status})."
+            if channel.status in INVALID:
+                reason = f"Its laboratory marked {channel.named} as not valid ({INVALID[channel.status]})."
                 self.unscorable.append(reason)
+            elif channel.status not in SOUND:
+                said = DOUBTFUL.get(channel.status, f"status {channel.status}, which is not known")
+                self._note("questionable_data", f"Its laboratory says of {channel.named}: {said}.", channel)
         absent = [channel for channel in channels if channel.curve not in self.curves]
         for channel in absent:
             self._note("channel_missing", f"The file of {channel.named} is not in the archive.", channel)

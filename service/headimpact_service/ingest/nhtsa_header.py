@@ -14,8 +14,16 @@ from headimpact.recording import SignalName
 from headimpact_service.errors import Problem
 
 HEAD_CG = "HDCG"
-INVALID = frozenset({"CF"})
-"""Status of a channel whose data its laboratory declares not valid."""
+INVALID = {
+    "CF": "CF: channel failed",
+    "MD": "MD: meaningless data",
+    "NO": "NO: no data",
+    "SF": "SF: system failed",
+}
+"""Statuses of a channel whose data its laboratory does not let stand."""
+DOUBTFUL = {"QD": "QD: questionable data"}
+SOUND = frozenset({"", "AM", "CM", "LN", "SC"})
+"""As measured, computed, linearised or scaled; or nothing said."""
 
 _SECTION = re.compile(r"-{3,}\s*([A-Z0-9 ]+?)\s*-{3,}")
 _TEST_NUMBER = re.compile(r"#.*Test Number:\s*([0-9]{1,8})\s*$", re.MULTILINE)

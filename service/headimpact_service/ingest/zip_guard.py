@@ -56,8 +56,9 @@ class GuardedZip:
             _require_harmless(entry)
         if sum(entry.file_size for entry in entries) > MAX_TOTAL:
             raise _unreadable(f"A zip archive may inflate to at most {MAX_TOTAL} bytes.")
-        self._entries = {entry.filename: entry for entry in entries if not entry.is_dir()}
-        if len(self._entries) != sum(not entry.is_dir() for entry in entries):
+        files = [entry for entry in entries if not entry.is_dir() and not _is_of_a_desktop(entry.filename)]
+        self._entries = {entry.filename: entry for entry in files}
+        if len(self._entries) != len(files):
             raise _unreadable("A zip archive holds each name once.")
         self._budget = MAX_READ
 
@@ -117,6 +118,12 @@ def _require_harmless(entry: zipfile.ZipInfo) -> None:
         raise _unreadable(f"A file in a zip archive may inflate to at most {MAX_ENTRY} bytes.")
     if entry.file_size > RATIO_FROM and entry.file_size > MAX_RATIO * max(entry.compress_size, 1):
         raise _unreadable(f"A file in a zip archive may inflate to at most {MAX_RATIO} times its size.")
+
+
+def _is_of_a_desktop(path: str) -> bool:
+    """What macOS and Windows put beside a folder's files: a twin ``._name`` of each, and how the folder looks."""
+    name = PurePosixPath(path).name
+    return path.startswith("__MACOSX/") or name.startswith("._") or name in {".DS_Store", "Thumbs.db", "desktop.ini"}
 
 
 def _leads_out(path: str) -> bool:

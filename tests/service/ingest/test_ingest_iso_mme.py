@@ -231,15 +231,34 @@ class TestMissing:
         record = one(iso_mme(held), fill_gaps=True)
         assert prepare(record.recording).notes[0].code == "gaps_filled"
 
-    @pytest.mark.parametrize("status", ["Channel failed", "Meaningless data", "No data", "System failed"])
+    @pytest.mark.parametrize(
+        "status",
+        [
+            "Channel failed",
+            "Meaningless data",
+            "No data",
+            "System failed",
+            "failed",
+            "meaningless",
+            "Invalid",
+            "not ok",
+        ],
+    )
     def test_a_channel_that_its_laboratory_disowns_is_never_scored(self, status):
         record = one(changed(data_status=status))
         assert [AX in reason and status.lower() in reason for reason in record.unscorable] == [True]
 
-    def test_a_questionable_channel_is_scored_with_a_warning(self):
-        record = one(changed(data_status="Questionable data"))
+    @pytest.mark.parametrize("status", ["Questionable data", "questionable", "defekt"])
+    def test_a_channel_of_which_its_laboratory_says_something_else_is_scored_with_a_warning(self, status):
+        record = one(changed(data_status=status))
         assert record.unscorable == ()
         assert AX in notes(record, "questionable_data")[0]
+        assert status.lower() in notes(record, "questionable_data")[0]
+
+    @pytest.mark.parametrize("status", ["OK", "good", "NOVALUE", "", "Linearised data", "scaled  data"])
+    def test_a_channel_that_its_laboratory_lets_stand_is_no_finding(self, status):
+        record = one(changed(data_status=status))
+        assert (record.unscorable, record.notes) == ((), ())
 
     def test_a_count_that_differs_from_the_header_s_is_noted(self):
         assert (
@@ -273,6 +292,14 @@ def test_a_line_that_is_no_number_is_refused(body):
 def test_too_few_and_too_many_samples_are_refused(count):
     held = channels() | {AX: channel(AX, "g", ["0.0"] * count)}
     assert codes(refused(iso_mme(held))) == [(None, "sample-count")]
+
+
+def test_what_a_desktop_puts_into_an_archive_is_passed_over():
+    files = {f"T1/Channel/T1.{n:03d}": content for n, content in enumerate(channels().values(), start=1)}
+    files |= {"T1/T1.mme": text({"Test number": "T1"})}
+    twins = {f"__MACOSX/{path.rpartition('/')[0]}/._{path.rpartition('/')[2]}": "\0\5\x16\7Mac OS X" for path in files}
+    beside = {"T1/.DS_Store": "\0\0\0\1Bud1", "T1/Channel/._T1.002": "\0\5\x16\7", "T1/Thumbs.db": "?"}
+    assert peaks(one(zipped(files | twins | beside)), "linear_acceleration")[0] == 30.0
 
 
 def test_a_mapping_or_another_preset_is_refused():
@@ -327,10 +354,36 @@ class TestTogether:
         assert w.time_s[0] - a.time_s[0] == pytest.approx(0.01)
         assert prepare(record.recording).kinematics.time_ms(0) == pytest.approx(0.0, abs=1e-9)
 
-    def test_channels_that_begin_later_are_cut_to_what_all_share(self):
+    def test_the_channels_of_a_signal_are_cut_to_what_they_share_and_the_other_signal_stays_whole(self):
         record = one(changed(time_of_first_sample=-0.005))
-        assert record.recording.angular_velocity.values.shape[0] == SAMPLES - 5
-        assert record.recording.pre_trigger_ms == 5.0
+        assert record.recording.linear_acceleration.values.shape[0] == SAMPLES - 5
+        assert record.recording.angular_velocity.values.shape[0] == SAMPLES
+        assert record.recording.pre_trigger_ms == 10.0
+        assert prepare(record.recording).kinematics.time_ms(0) == pytest.approx(-5.0, abs=1e-9)
+        assert [n.channel for n in record.notes if n.code == "sample_count_mismatch"] == ["x", "y", "z"]
+
+    def test_a_channel_that_ends_early_cuts_no_other_signal_and_what_it_hides_is_said(self):
+        ay = next(code for code in ISO_CODES if "ACY" in code)
+        short = half_sine(SAMPLES, -12.0)[:12].tolist()
+        record = one(iso_mme(channels() | {ay: channel(ay, "g", short)}))
+        assert record.recording.linear_acceleration.values.shape[0] == 12
+        assert record.recording.angular_velocity.values.shape[0] == SAMPLES
+        said = [(n.code, n.signal, n.channel) for n in record.notes]
+        assert said == [
+            ("sample_count_mismatch", "linear_acceleration", "x"),
+            ("peak_cut_off", "linear_acceleration", "x"),
+            ("sample_count_mismatch", "linear_acceleration", "z"),
+            ("peak_cut_off", "linear_acceleration", "z"),
+        ]
+        found = [(n.code, n.signal) for n in prepare(record.recording).notes]
+        assert ("peak_cut_off", "angular_velocity") in found
+
+    def test_signals_of_one_rate_that_begin_apart_are_scored_where_they_overlap(self):
+        late = {code: pair for code, pair in ISO_CODES.items() if "AV" in code}
+        record = one(iso_mme(channels() | channels(late, time_of_first_sample=0.02)))
+        assert record.recording.linear_acceleration.values.shape[0] == SAMPLES
+        assert record.recording.pre_trigger_ms == 10.0
+        assert prepare(record.recording).kinematics.time_ms(0) == pytest.approx(20.0, abs=1e-9)
 
     def test_a_resultant_alone_is_no_head(self):
         code = "11HEADCG00H3ACRA"

@@ -143,6 +143,32 @@ def test_a_channel_marked_invalid_makes_the_impact_unscorable_and_names_it():
     assert record.recording.linear_acceleration is not None
 
 
+def _with_status(status):
+    marked = [row(2, "AC", "YL", status=status) if "|2|AC" in line else line for line in rows()]
+    return one(zipped(files(header=ev5(*marked))))
+
+
+@pytest.mark.parametrize("status", ["CF", "cf", "MD", "NO", "SF"])
+def test_a_channel_that_its_laboratory_disowns_is_never_scored(status):
+    record = _with_status(status)
+    assert [status.upper() in reason for reason in record.unscorable] == [True]
+
+
+@pytest.mark.parametrize(("status", "said"), [("QD", "questionable data"), ("XX", "XX, which is not known")])
+def test_a_channel_of_which_its_laboratory_says_something_else_is_scored_with_a_warning(status, said):
+    record = _with_status(status)
+    assert record.unscorable == ()
+    [note] = record.notes
+    assert (note.code, note.signal, note.channel) == ("questionable_data", "linear_acceleration", "y")
+    assert said in note.detail
+
+
+@pytest.mark.parametrize("status", ["", "AM", "CM", "LN", "SC"])
+def test_a_channel_that_its_laboratory_lets_stand_is_no_finding(status):
+    record = _with_status(status)
+    assert (record.unscorable, record.notes) == ((), ())
+
+
 def test_a_valid_redundant_sensor_stands_in_for_an_invalid_one():
     header = ev5(
         *[row(2, "AC", "YL", status="CF") if "|2|AC" in line else line for line in rows()], row(7, "AC", "YL", mark="R")
