@@ -1,8 +1,8 @@
 """DTS / TDAS CSV: some twenty rows of ``key,value…`` with a value for each channel, then a column for each channel.
 
 The columns stand in the order of the rows above them. A column of times before them is not needed: the header says the
-rate, and how many points lie before the trigger. What the header says of filtering counts, not the last letter of the
-channel's code.
+rate, and how much lies before the trigger; where it stands, it must agree. What the header says of filtering counts,
+not the last letter of the channel's code.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -19,56 +19,40 @@ import numpy as np
 from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, curve_fault
+from headimpact_service.ingest.dts_header import (
+    A_NUMBER,
+    MAX_HEADER_ROWS,
+    Header,
+    key_of,
+    read_header,
+    without_empty_end,
+)
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
-from headimpact_service.ingest.headings import compact
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.iso_codes import HeadCode, head_code, unit_of
-from headimpact_service.ingest.iso_mme_files import NO_VALUE, NUMBER, decoded
+from headimpact_service.ingest.iso_mme_files import NO_VALUE, decoded
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
+from headimpact_service.ingest.stamps import follows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
 
 PRESET = "dts"
 MAX_FILE = 64 * 1024 * 1024
-MAX_HEADER_ROWS = 200
 MAX_CHANNELS = 1024
 MAX_LINE = 256 * 1024
 
-# Keys without case, spaces and signs, by the beginning that all spellings share.
-_KEYS = {
-    "rate": ("samplerate", "samplingrate"),
-    "code": ("isochannelcode", "isocode"),
-    "unit": ("engineeringunit", "eu", "unit"),
-    "filter": ("softwarefilter",),
-    "name": ("channeldescription", "channelname", "description", "location"),
-    "before": ("prezero", "numberofprezero", "pretriggerp"),
-    "after": ("postzero", "numberofpostzero", "posttriggerp"),
-    "points": ("numberofpts", "numberofpoints", "totalpts", "totalpoints"),
-}
-_NUMBER = re.compile(NUMBER, re.ASCII)
-
-
-@dataclass(frozen=True, slots=True)
-class _Header:
-    """The rows above the samples: cells by what they say."""
-
-    fields: dict[str, list[str]]
-    metadata: dict[str, str]
-
-    def of_channel(self, key: str, index: int) -> str:
-        """The channel's cell; a row with a single cell speaks for all channels."""
-        cells = self.fields.get(key, [])
-        if len(cells) == 1:
-            return cells[0]
-        return cells[index] if index < len(cells) else ""
+_UNITS_PER_S = (1.0, 1e3, 1e6)
+"""What a column of times may count: seconds, or parts of them."""
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?", re.ASCII)
+_MAY_GROUP = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", re.ASCII)
 
 
 def is_dts(head: bytes) -> bool:
     """Whether a text file begins with the rows of a DTS header: a rate and the channels' codes or units."""
     rows = [line.split(_delimiter(line)) for line in decoded_head(head)[:MAX_HEADER_ROWS]]
-    told = {name for row in rows if (name := _key(row[0])) is not None and len(row) > 1}
+    told = {name for row in rows if (name := key_of(row[0])) is not None and len(row) > 1}
     return "rate" in told and "code" in told
 
 
@@ -84,7 +68,7 @@ def read_dts(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | 
     With a mapping, its columns are found by the channels' codes or names, and the header gives rate and trigger.
     """
     rows = _rows(source)
-    header, first = _header(rows)
+    header, first = read_header(rows)
     data = _Data(header, rows[first:])
     if options.mapping is not None:
         yield from _mapped(data, options)
@@ -112,49 +96,34 @@ def _rows(source: Source) -> list[list[str]]:
         raise Problem("unreadable-file", f"A line may have at most {MAX_LINE} characters, and no NUL among them.")
     if len(lines) > MAX_HEADER_ROWS + MAX_SAMPLES + 100:
         raise curve_fault(f"A file may hold at most {MAX_SAMPLES} samples.", "sample-count")
-    wanted = next((line for line in lines[:MAX_HEADER_ROWS] if _key(re.split(r"[,;\t]", line)[0]) == "code"), lines[0])
+    wanted = next(
+        (line for line in lines[:MAX_HEADER_ROWS] if key_of(re.split(r"[,;\t]", line)[0]) == "code"), lines[0]
+    )
+    delimiter = _delimiter(wanted)
     try:
-        found = list(csv.reader(lines, delimiter=_delimiter(wanted), strict=True))
+        found = list(csv.reader(lines, delimiter=delimiter, strict=True))
     except csv.Error:
         raise Problem("unreadable-file", "The file's quotes do not match.") from None
-    return [[cell.strip() for cell in row] for row in found if any(cell.strip() for cell in row)]
+    rows = [[cell.strip() for cell in row] for row in found if any(cell.strip() for cell in row)]
+    return rows if delimiter == "," else _with_decimal_points(rows)
+
+
+def _with_decimal_points(rows: list[list[str]]) -> list[list[str]]:
+    """The rows of a file with decimal commas: some comma in its numbers cannot group thousands."""
+    told = {cell for row in rows for cell in row if _DECIMAL_COMMA.fullmatch(cell)}
+    if all(_MAY_GROUP.fullmatch(cell) for cell in told):
+        return rows
+    return [[cell.replace(",", ".") if cell in told else cell for cell in row] for row in rows]
 
 
 def _delimiter(line: str) -> str:
     return max(",;\t", key=line.count)
 
 
-def _header(rows: Sequence[Sequence[str]]) -> tuple[_Header, int]:
-    """The rows that begin with words, and the first that does not."""
-    fields: dict[str, list[str]] = {}
-    metadata: dict[str, str] = {}
-    for number, row in enumerate(rows[:MAX_HEADER_ROWS]):
-        if _NUMBER.fullmatch(row[0] or next(filter(None, row))) is not None:
-            return _Header(fields, metadata), number
-        name = _key(row[0])
-        if name is not None:
-            fields.setdefault(name, _without_empty_end(row[1:]))
-        elif compact(row[0]).startswith("test") and len(row) > 1 and row[1]:
-            metadata.setdefault("_".join(re.findall(r"[a-z]+", row[0].lower()))[:40], row[1][:200])
-    raise Problem("unreadable-file", f"The first {MAX_HEADER_ROWS} rows of the file hold no sample.")
-
-
-def _key(cell: str) -> str | None:
-    plain = compact(cell.strip().strip('"'))
-    return next((name for name, spellings in _KEYS.items() if plain.startswith(spellings)), None)
-
-
-def _without_empty_end(cells: Sequence[str]) -> list[str]:
-    kept = list(cells)
-    while kept and not kept[-1]:
-        kept.pop()
-    return kept
-
-
 class _Data:
     """The samples, by channel."""
 
-    def __init__(self, header: _Header, rows: Sequence[Sequence[str]]) -> None:
+    def __init__(self, header: Header, rows: Sequence[Sequence[str]]) -> None:
         """Look at the header only; columns are read as they are asked for."""
         self.header = header
         codes = header.fields.get("code", [])
@@ -162,13 +131,13 @@ class _Data:
         self.channels = max(len(codes), len(names), len(header.fields.get("unit", [])))
         if not 1 <= self.channels <= MAX_CHANNELS:
             raise Problem("unreadable-file", f"A file may have 1 to {MAX_CHANNELS} channels.")
-        self.rows = [_without_empty_end(row) for row in rows]
+        self.rows = [without_empty_end(row) for row in rows]
         self.first = self._first_column()
-        self.rate = self._number("rate", "The sample rate")
-        before = header.of_channel("before", 0)
-        self.points_before = self._number("before", "The number of points before the trigger") if before else None
-        if self.rate is None or self.rate <= 0.0:
+        rate = header.number("rate", "The sample rate")
+        if rate is None or rate <= 0.0:
             raise curve_fault("The header gives no sample rate.", "rate-missing")
+        self.rate = rate
+        self.points_before = self._points_before()
 
     def _first_column(self) -> int:
         """The column of the first channel: one stands before it where the rows are one cell longer."""
@@ -180,15 +149,42 @@ class _Data:
             )
         return width - self.channels
 
-    def _number(self, key: str, what: str) -> float | None:
-        """A number that all channels share."""
-        cells = set(filter(None, self.header.fields.get(key, [])))
-        if not cells:
+    def _points_before(self) -> float | None:
+        """How many samples lie before the trigger: as the header says, else by the times, which must agree with it."""
+        told, first_s = self.header.points_before(self.rate), self._first_time_s()
+        if first_s is None or first_s >= 0.0:  # times may count from the record's start
+            return told
+        by_times = -first_s * self.rate
+        if told is None:
+            return by_times
+        if abs(told - by_times) > 1.0:
+            raise curve_fault(
+                f"The header says that {told:g} samples lie before the trigger, the times say {by_times:g}.",
+                "time-zero",
+            )
+        return told
+
+    def _first_time_s(self) -> float | None:
+        """When the record begins, by its column of times [s]; None without one, or where samples are only numbered."""
+        if not self.first:
             return None
-        numbers = {float(cell) for cell in cells if _NUMBER.fullmatch(cell)}
-        if len(numbers) != 1 or not all(_NUMBER.fullmatch(cell) for cell in cells):
-            raise curve_fault(f"{what} must be one number for all channels.", "rates-differ")
-        return numbers.pop()
+        cells = [row[0] if row else "" for row in self.rows]
+        if not all(map(A_NUMBER.fullmatch, cells)) or len(cells) < 3:
+            raise curve_fault(
+                "A cell of the column before the channels, which gives the times, is no number.", "time-form"
+            )
+        times = np.array([float(cell) for cell in cells])
+        for unit in _UNITS_PER_S:
+            if follows(times * (1000.0 / unit), self.rate, drift=0.0):
+                return float(times[0]) / unit
+        if (np.diff(times) == 1.0).all():
+            return None
+        step = float(np.median(np.diff(times)))
+        raise curve_fault(
+            f"The column before the channels steps by {step:g}, evenly or not, where the header says {self.rate:g} "
+            "samples per second: which of them is right?",
+            "rates-differ",
+        )
 
     def channel(self, index: int) -> HeadChannel | None:
         """The channel of a column, if it is one of a head's."""
@@ -201,7 +197,7 @@ class _Data:
     def points(self, index: int) -> float | None:
         """How many samples the header says that a channel has: in all, or before and after the trigger."""
         said = [self.header.of_channel(key, index) for key in ("points", "before", "after")]
-        points, before, after = (float(cell) if _NUMBER.fullmatch(cell) else None for cell in said)
+        points, before, after = (float(cell) if A_NUMBER.fullmatch(cell) else None for cell in said)
         if points is not None or before is None or after is None:
             return points
         # some count the trigger's own sample with those after it, some with neither
@@ -220,9 +216,8 @@ class _Data:
         if unit is None:
             raise curve_fault(f"The unit of {self.named(index)} is none that is known for it.", "unit-missing")
         values = self.values(index)
-        rate = float(self.rate or 0.0)
-        stamps: FloatArray = (np.arange(values.size, dtype=np.float64) - (self.points_before or 0.0)) / rate
-        return Curve(code.axis, unit, values, stamps, rate)
+        stamps: FloatArray = (np.arange(values.size, dtype=np.float64) - (self.points_before or 0.0)) / self.rate
+        return Curve(code.axis, unit, values, stamps, self.rate)
 
     def values(self, index: int) -> FloatArray:
         """The samples of a channel; NaN where a cell is empty or says that there is no value."""
@@ -233,7 +228,7 @@ class _Data:
         return np.array([self._value(cell, index, sample) for sample, cell in enumerate(cells)])
 
     def _value(self, cell: str, index: int, sample: int) -> float:
-        if _NUMBER.fullmatch(cell) is not None:
+        if A_NUMBER.fullmatch(cell) is not None:
             return float(cell)
         if not cell or cell.upper() in {NO_VALUE, "NAN"}:
             return float("nan")
@@ -266,7 +261,7 @@ def _mapped(data: _Data, options: ImportOptions) -> Iterator[ImpactRecord | Prob
     asked = options.mapping
     assert asked is not None
     known: dict[str, Any] = {"sample_rate_hz": data.rate, "axes": "sae_j211"}
-    if data.points_before is not None and data.rate:
+    if data.points_before is not None:
         known["pre_trigger_ms"] = round(data.points_before / data.rate * 1000.0, 9)
     given = {name: value for name, value in known.items() if name not in asked.model_fields_set}
     mapping = asked.model_copy(update=given)

@@ -35,7 +35,7 @@ _UNITS: dict[SignalName, dict[str, str]] = {
     },
     "angular_velocity": {
         **dict.fromkeys(("rads", "radsec", "radps"), "rad/s"),
-        **dict.fromkeys(("degs", "degsec", "degps", "dps"), "deg/s"),
+        **dict.fromkeys(("degs", "degsec", "degps", "dps", "degreess", "degreessec"), "deg/s"),
     },
     "angular_acceleration": {
         **dict.fromkeys(("rads2", "radss", "radsec2", "radps2"), "rad/s^2"),

@@ -41,14 +41,14 @@ def before_zero_ms(spans: Iterable[tuple[float, float]]) -> float | None:
     return round(-min(starts), 9) if min(starts) < 0.0 <= max(ends) else None
 
 
-def follows(stamps_ms: FloatArray, rate_hz: float) -> bool:
+def follows(stamps_ms: FloatArray, rate_hz: float, *, drift: float = DRIFT) -> bool:
     """Whether stamps [ms] go on at a rate, sample by sample, as far as they are rounded and clocks drift."""
     if not stamps_ms.size:
         return True
     elapsed = np.arange(stamps_ms.size) * 1000.0 / rate_hz
     rounded_to = next((grid for grid in ROUNDED_TO_MS if _are_multiples(stamps_ms, grid)), 0.0)
     stray = np.abs(stamps_ms - stamps_ms[0] - elapsed)
-    return bool((stray <= NEAR * 1000.0 / rate_hz + rounded_to + DRIFT * elapsed).all())
+    return bool((stray <= NEAR * 1000.0 / rate_hz + rounded_to + drift * elapsed).all())
 
 
 def _are_multiples(values: FloatArray, grid: float) -> bool:

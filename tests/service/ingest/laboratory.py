@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -93,6 +93,7 @@ def dts(
     samples: int = SAMPLES,
     length: int = 12,
     changes: Mapping[str, Sequence[object]] | None = None,
+    times: Callable[[int], float] | None = None,
 ) -> str:
     """An export: the gyroscope's channels first, z before y before x."""
     count = len(columns)
@@ -116,5 +117,6 @@ def dts(
         rows.append(["Time (sec)", *columns])
     waves = np.stack([half_sine(samples, peak, 10, length) for _, peak in columns.values()], axis=1)
     for index, values in enumerate(waves.tolist()):
-        rows.append([*([(index - (before or 0)) / rate_hz] if time_column else []), *values])
+        time = (index - (before or 0)) / rate_hz if times is None else times(index)
+        rows.append([*([time] if time_column else []), *values])
     return "\r\n".join(delimiter.join(map(str, row)) for row in rows) + "\r\n"

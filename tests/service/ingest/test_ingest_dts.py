@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -45,7 +47,8 @@ def test_the_header_s_filter_counts_not_the_code_s_last_letter():
 
 
 def test_a_value_that_is_given_once_is_that_of_every_channel():
-    once = dts(changes={"Sample Rate (Hz)": ["10000"], "Pre-zero Data Pts": ["20"], "Software Filter": ["NONE"]})
+    once = {"Sample Rate (Hz)": ["10000"], "Pre-zero Data Pts": ["20"], "Software Filter": ["NONE"]}
+    once = dts(changes=once, time_column=False)
     recording = one(once).recording
     assert recording.angular_velocity.sample_rate_hz == 10_000.0
     assert recording.pre_trigger_ms == 2.0
@@ -53,6 +56,75 @@ def test_a_value_that_is_given_once_is_that_of_every_channel():
 
 def test_without_points_before_the_trigger_the_trigger_is_not_known():
     assert one(dts(before=None)).recording.pre_trigger_ms is None
+
+
+class TestTimes:
+    """The column of times against the header."""
+
+    @pytest.mark.parametrize("per_second", [1.0, 1e3, 1e6])
+    def test_it_may_count_seconds_or_parts_of_them_and_then_gives_the_trigger(self, per_second):
+        text = dts(before=None, times=lambda n: (n - 10) / 20_000 * per_second)
+        assert one(text).recording.pre_trigger_ms == pytest.approx(0.5)
+
+    @pytest.mark.parametrize("times", [lambda n: n, lambda n: n + 1.0, lambda n: n / 20_000])
+    def test_numbers_of_samples_and_times_from_the_start_leave_the_trigger_to_the_header(self, times):
+        assert one(dts(times=times)).recording.pre_trigger_ms == 0.5
+        assert one(dts(before=None, times=times)).recording.pre_trigger_ms is None
+
+    @pytest.mark.parametrize(
+        "times",
+        [
+            lambda n: n / 10_000,
+            lambda n: n / 20_000 + (0.001 if n > 40 else 0.0),
+            lambda n: -n / 20_000,
+            lambda n: 2.0 * n,
+        ],
+    )
+    def test_times_at_another_rate_than_the_header_s_are_refused(self, times):
+        problem = refused(dts(times=times))
+        assert codes(problem) == [(None, "rates-differ")]
+        assert "20000" in problem.detail
+
+    def test_times_that_put_the_trigger_elsewhere_are_refused(self):
+        problem = refused(dts(times=lambda n: (n - 25) / 20_000))
+        assert codes(problem) == [(None, "time-zero")]
+        assert "10 samples" in problem.detail
+        assert "25" in problem.detail
+
+    def test_a_time_that_is_no_number_is_refused(self):
+        assert codes(refused(dts(times=lambda n: "x" if n == 30 else n / 20_000))) == [(None, "time-form")]
+
+    @pytest.mark.parametrize(
+        ("key", "value"),
+        [
+            ("Pre-zero points", 10),
+            ("Number of pre-zero points", "10.0"),
+            ("Number of Pre-Trigger Samples", 10),
+            ("Pre Trigger Samples", 10),
+            ("Pre-zero seconds", 0.0005),
+            ("Pre-Trigger Time (s)", 0.0005),
+            ("PreTrigger (ms)", 0.5),
+        ],
+    )
+    def test_the_record_before_the_trigger_is_counted_in_points_or_in_time(self, key, value):
+        text = dts(before=None, time_column=False, changes={key: [value]})
+        assert one(text).recording.pre_trigger_ms == pytest.approx(0.5)
+
+    def test_a_part_of_a_point_before_the_trigger_is_refused(self):
+        text = dts(before=None, time_column=False, changes={"Pre-zero points": [0.05]})
+        assert codes(refused(text)) == [(None, "time-zero")]
+
+
+def test_decimal_commas_are_read_where_semicolons_part_the_cells():
+    assert np.array_equal(
+        one(dts(delimiter=";").replace(".", ",")).recording.linear_acceleration.values,
+        one(dts()).recording.linear_acceleration.values,
+    )
+
+
+def test_a_comma_that_may_group_thousands_is_no_number():
+    text = re.sub(r"(?<![0-9])-?[0-9]+[.][0-9]+", "1,000", dts(delimiter=";", before=None, changes={"Test ID": ["7"]}))
+    assert codes(refused(text)) == [(None, "time-form")]
 
 
 def test_a_row_of_codes_may_leave_a_cell_for_the_time():
