@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from headimpact.recording import AXES, SIGNALS, SignalName
@@ -11,6 +11,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_rules import required_axes
 from headimpact_service.ingest.mapping import TIME_UNITS, DateAndTime, Mapping, SignalColumns
+from headimpact_service.ingest.unread import NOTHING_UNREAD, Unread, unread_columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,8 @@ class Layout:
     unscorable: int | None
     time_base: int | None
     sample_number: int | None
+    unread: Unread = NOTHING_UNREAD
+    """What may tell that the rows are several impacts, where nothing that is read would."""
 
     @property
     def labels(self) -> list[int]:
@@ -87,7 +90,18 @@ class Layout:
         """Columns that are read as text."""
         one_each = (self.external_id, self.athlete, self.device, self.unscorable, self.time_base)
         named = (*one_each, *self.keys, *self.occurred_at, *self.context.values(), *self.reading.values())
-        return sorted({column for column in named if column is not None})
+        return sorted({column for column in (*named, *self.unread.columns) if column is not None})
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether every signal has stamps."""
+        return self.clock is not None or all(signal.clock is not None for signal in self.signals.values())
+
+    def watching(self, headings: Headings) -> Layout:
+        """The same, with the columns beside it that tell several impacts from one, unless others do."""
+        if self.keys or self.is_timed or self.sample_number is not None:
+            return self
+        return replace(self, unread=unread_columns(headings.written, {*self.numbers, *self.texts}))
 
 
 def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> Layout:

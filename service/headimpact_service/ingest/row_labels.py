@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.impact_json import MIN_RATE_HZ
-from headimpact_service.ingest.labels import label_fault, moment
+from headimpact_service.ingest.labels import label_fault
 from headimpact_service.ingest.layout import Layout
-from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.unread import ROUNDED_TO_S, are_several, begins_anew, lie_apart, moment_of, span_s
 from headimpact_service.ingest.windows import Rows, numbers_of
 
-ROUNDED_TO_S = 1.0
-"""Times of samples may be written to the second."""
+_OR_ONE = "; if they are one, say so by an empty group_by"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,35 +38,50 @@ class RowLabels:
             return text
         return next(filter(None, self._distinct(column)), "")
 
-    def require_one_impact(self, options: ImportOptions) -> None:
+    def require_one_impact(self, time_zone: str | None) -> None:
         """Refuse rows that say different things of their impact: they are several, and nothing tells them apart."""
+        self._require_unread_alike(time_zone)
         if self.alike:
             return
         for column in self.layout.labels:
             if len([cell for cell in self._distinct(column) if cell]) > 1:
                 raise self._several(f"Column {column + 1} does not say the same")
-        columns = [] if options.occurred_at is not None else self.layout.occurred_at
-        if any(len(self._distinct(column)) > 1 for column in columns):
-            self._require_one_time(columns, options.time_zone)
+        if any(len(self._distinct(column)) > 1 for column in self.layout.occurred_at):
+            self._require_one_time(self.layout.occurred_at, time_zone)
+
+    def _require_unread_alike(self, time_zone: str | None) -> None:
+        """The same of columns that are not read otherwise, by what their headings say they are."""
+        unread = self.layout.unread
+        for column in unread.names:
+            if are_several(self._cells(column)):
+                raise self._several(f"Column {column + 1} does not say the same", _OR_ONE)
+        for column in unread.times:
+            if lie_apart(self._cells(column), time_zone):
+                raise self._several(f"Column {column + 1} does not say one time", _OR_ONE)
+        for column in unread.counters:
+            if begins_anew(self._cells(column)):
+                raise self._several(f"Column {column + 1} does not count on", _OR_ONE)
+
+    def _cells(self, column: int) -> list[str]:
+        cells = self.texts[column]
+        return list(cells[self.rows] if isinstance(self.rows, slice) else map(cells.__getitem__, self.rows))
 
     def _distinct(self, column: int) -> list[str]:
         """What the impact's rows say in a column, in their order."""
-        cells = self.texts[column]
-        told = cells[self.rows] if isinstance(self.rows, slice) else map(cells.__getitem__, self.rows)
-        return list(dict.fromkeys(map(said, told)))
+        return list(dict.fromkeys(map(said, self._cells(column))))
 
     def _require_one_time(self, columns: Sequence[int], time_zone: str | None) -> None:
         """Times that go on from sample to sample are those of the samples; others are of several impacts."""
         rows = numbers_of(self.rows)
         told = dict.fromkeys(tuple(said(self.texts[column][row]) for column in columns) for row in rows)
-        moments = [moment(list(parts), time_zone) for parts in told if all(parts)]
+        moments = [moment_of("T".join(parts), time_zone) for parts in told if all(parts)]
         known = [when for when in moments if when is not None]
-        if known and (max(known) - min(known)).total_seconds() > len(rows) / MIN_RATE_HZ + ROUNDED_TO_S:
+        if known and span_s(known) > len(rows) / MIN_RATE_HZ + ROUNDED_TO_S:
             raise self._several("The time of the impact is not the same")
 
-    def _several(self, what: str) -> Problem:
+    def _several(self, what: str, otherwise: str = "") -> Problem:
         return label_fault(
             f"{what} in all rows of the impact that begins in row {self.row + 1} below the headings: if they are "
-            "several impacts, tell them apart by a column impact_id or a mapping's group_by.",
+            f"several impacts, tell them apart by a column impact_id or a mapping's group_by{otherwise}.",
             "several-impacts",
         )

@@ -127,7 +127,7 @@ class TableImpact:
     def record(self) -> ImpactRecord:
         """The impact, with what the sender gave beside the file in place of what the file says."""
         options, named = self.options, self.plan.named
-        self.labels.require_one_impact(options)
+        self.labels.require_one_impact(options.time_zone)
         unscorable = self._text(self.layout.unscorable)
         recording = self._recording(scorable=unscorable is None)
         return ImpactRecord(

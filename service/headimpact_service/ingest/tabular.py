@@ -33,6 +33,8 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     layout = lay_out(plan.mapping, headings, plan.required)
     _require_read(layout, headings, options)
     _require_rate(layout, plan)
+    if not (table.parted or _names_one_impact(options)):
+        layout = layout.watching(headings)
     blocks = table.blocks(layout.numbers, layout.texts)
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
     count = 0
@@ -43,6 +45,11 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
         yield from _read_window(plan, layout, window)
     if count == 0:
         raise Problem("unreadable-file", "The file has headings but no samples.")
+
+
+def _names_one_impact(options: ImportOptions) -> bool:
+    """Whether the sender says that nothing parts the rows: they are one impact."""
+    return options.mapping is not None and options.mapping.group_by == []
 
 
 def _read_window(plan: Plan, layout: Layout, window: Window) -> Iterator[ImpactRecord | Problem]:

@@ -1,0 +1,97 @@
+"""Columns that no layout reads and that tell that the rows of a table are several impacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from ingest_files import codes, csv_text, one, refused
+
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.record import ImpactRecord
+
+SAMPLES = 40
+
+
+def untimed(heading: str, cells: Sequence[object], records: int = 3) -> str:
+    """The usual table without times, as often as there are records, with one more column."""
+    first, *lines = (line.partition(",")[2] for line in csv_text().splitlines())
+    rows = lines * records
+    return "\n".join([f"{heading},{first}", *(f"{cell},{row}" for cell, row in zip(cells, rows, strict=True))])
+
+
+def each(*names: object) -> list[object]:
+    return [name for name in names for _ in range(SAMPLES)]
+
+
+def shape(record: ImpactRecord) -> int:
+    return int(record.recording.linear_acceleration.values.shape[0])
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [
+        *((name, each(1, 2, 3)) for name in ("Impact", "Impact #", "Impact No.", "impactNumber", "Event ID", "hit_id")),
+        ("uuid", each("a3", "b7", "c1")),
+        ("Player", each("A", "B", "A")),
+        ("file name", each("a.csv", "b.csv", "c.csv")),
+        ("Sample", [*range(SAMPLES)] * 3),
+        ("Sample Number", [float(n) for n in range(SAMPLES)] * 3),
+        ("index", [*range(1, SAMPLES + 1)] * 3),
+        ("Impact Time", each("10:01:01", "10:02:02", "10:03:03")),
+        ("Timestamp", each("2024-05-06T12:13:14Z", "2024-05-06T12:15:14Z", "2024-05-06T12:17:14Z")),
+        ("Date Time", each("2024/05/06 12:13:14", "2024/05/06 12:13:34", "2024/05/06 12:17:14")),
+        ("Time", each("37:10.6", "38:10.6", "39:12.0")),
+    ],
+)
+def test_rows_that_an_unread_column_tells_apart_are_refused(heading: str, cells: Sequence[object]) -> None:
+    problem = refused(untimed(heading, cells), sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "several-impacts")]
+    assert "Column 1 " in problem.detail
+    assert "empty group_by" in problem.detail
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [
+        ("Impact", each(1)),
+        ("Event ID", range(SAMPLES)),
+        ("id", [f"{n:03}" for n in range(SAMPLES)]),
+        ("Impact Force N", np.sin(np.arange(SAMPLES) / 9).round(2).tolist()),
+        ("Sample", range(SAMPLES)),
+        ("Frame", range(100, 100 + 2 * SAMPLES, 2)),
+        ("Timestamp", [f"2024-05-06T12:13:14.{n:03}Z" for n in range(SAMPLES)]),
+        ("Timestamp", ["2024-05-06T12:13:14Z"] * 20 + ["2024-05-06T12:13:15Z"] * 20),
+        ("Time of day", [f"10:01:01.{n:03}" for n in range(SAMPLES)]),
+        ("Clock", [f"37:10.{n:03}" for n in range(SAMPLES)]),
+        ("temperature", [20 + n // 10 for n in range(SAMPLES)]),
+        ("Player", [*[""] * 39, "A"]),
+    ],
+)
+def test_one_impact_stays_one(heading: str, cells: Sequence[object]) -> None:
+    assert shape(one(untimed(heading, cells, records=1), sample_rate_hz=1000.0)) == SAMPLES
+
+
+def test_the_sender_may_say_that_they_are_one_or_what_tells_them_apart() -> None:
+    text = untimed("Event", each(1, 2, 3))
+    assert shape(one(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[]))) == 3 * SAMPLES
+    assert (
+        shape(one(untimed("Event", each(1), records=1), sample_rate_hz=1e3, mapping=Mapping(group_by=["Event"]))) == 40
+    )
+
+
+def test_a_mapping_of_the_signals_alone_keeps_the_guard() -> None:
+    columns = {"unit": "g", "x": "ax_g", "y": "ay_g", "z": "az_g"}
+    mapping = Mapping.model_validate({"linear_acceleration": columns, "sample_rate_hz": 1000.0})
+    problem = refused(untimed("Event", each(1, 2, 3)), mapping=mapping)
+    assert codes(problem) == [(None, "several-impacts")]
+
+
+def test_times_that_differ_are_those_of_several_impacts_though_the_sender_gives_one() -> None:
+    told = ("2026-11-20T19:00:00Z", "2026-11-20T19:01:00Z", "2026-11-20T19:02:00Z")
+    problem = refused(untimed("occurred_at", each(*told)), sample_rate_hz=1000.0, occurred_at="2026-11-20T19:00:00Z")
+    assert codes(problem) == [(None, "several-impacts")]
+    broken = untimed("occurred_at", each("37:10.6"), records=1)
+    found = one(broken, sample_rate_hz=1000.0, occurred_at="2026-11-20T19:00:00Z")
+    assert found.occurred_at is not None
