@@ -14,13 +14,13 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain, islice
-from types import MappingProxyType
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import LineCells, is_no_number
+from headimpact_service.ingest.heading_rows import LOOK, top_of
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
@@ -58,7 +58,6 @@ class CsvTable:
     """The headings of a CSV file, and its columns when they are asked for."""
 
     parted = False
-    units: Mapping[int, str] = MappingProxyType({})
 
     def __init__(self, stream: BinaryIO, *, skip_rows: int = 0) -> None:
         """Look through the file, then read as far as the headings; 422 where there are none."""
@@ -68,12 +67,13 @@ class CsvTable:
         self._quoted = text.quoted
         self._line = 0
         self._begun, self._empty_rows = False, 0
-        heading = self._first_line(skip_rows)
+        heading, has_units = self._find_headings(skip_rows)
         self._delimiter = delimiter_of(heading)
         self._decimal_mark = ""
         self._decimal_commas = text.has_decimal_commas(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
         self.headings: tuple[str, ...] = tuple(self._rows(reader, 1)[0])
+        self.units: Mapping[int, str] = self._read_units(reader) if has_units else {}
         self._simply_quoted = _simply_quoted(self._delimiter)
         if len(self.headings) > MAX_COLUMNS:
             raise unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
@@ -88,8 +88,22 @@ class CsvTable:
                 texts=dict(zip(texts, cells, strict=True)),
             )
 
+    def _find_headings(self, skip_rows: int) -> tuple[str, bool]:
+        """The line of headings, and whether units follow it; the lines above it are gone."""
+        first = self._first_line(skip_rows)
+        ahead = [first, *islice(self._lines, LOOK)]
+        top = top_of(ahead, search=not skip_rows)
+        self._lines = chain(ahead[top.heading + 1 :], self._lines)
+        self._line += top.heading
+        return ahead[top.heading], top.units > 0
+
+    def _read_units(self, reader: Reader) -> dict[int, str]:
+        """The row of units below the headings."""
+        self._line += 1
+        return dict(enumerate(self._rows(reader, 1)[0]))
+
     def _first_line(self, skip_rows: int) -> str:
-        """The line of headings: the first that is neither skipped, empty, a comment nor a spreadsheet's `sep=;`."""
+        """The first line that is neither skipped, empty, a comment nor a spreadsheet's `sep=;`."""
         for number, line in enumerate(self._lines):
             if number >= skip_rows and line.strip() and not line.startswith("#") and not _SEPARATOR.fullmatch(line):
                 self._line = number

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import curve_fault
-from headimpact_service.ingest.headings import compact
 from headimpact_service.ingest.iso_mme_files import NUMBER
+from headimpact_service.ingest.spelling import compact
 
 MAX_HEADER_ROWS = 200
 

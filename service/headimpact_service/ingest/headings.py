@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,16 +9,7 @@ from typing import Any
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest import mapping as mappings
-
-_NO_SIGN_OR_LETTER = re.compile(r"[^0-9a-z]+")
-_WORDED = str.maketrans({"°": "deg", "µ": "u", "μ": "u", "ω": "omega", "α": "alpha"})
-MAX_COMPACT = 200
-
-
-def compact(heading: str) -> str:
-    """A heading without what people spell differently: case, spaces, punctuation, `²` for `2`, `µ` for `u`."""
-    plain = unicodedata.normalize("NFKC", heading[:MAX_COMPACT].translate(_WORDED)).casefold()
-    return _NO_SIGN_OR_LETTER.sub("", plain)
+from headimpact_service.ingest.spelling import MAX_COMPACT, compact
 
 
 class Headings:
@@ -35,8 +24,8 @@ class Headings:
 
     @property
     def spoken(self) -> list[str]:
-        """The headings, each with the unit that stands beside it in the file."""
-        return [f"{heading} {self.units.get(place, '')}" for place, heading in enumerate(self.written)]
+        """The headings, each with the unit that stands beside it in the file, unless it ends in that itself."""
+        return [_with_unit(heading, self.units.get(place, "")) for place, heading in enumerate(self.written)]
 
     def find(self, spellings: Sequence[str]) -> int | None:
         """The column that one of the spellings names; a heading as written wins over a looser match.
@@ -59,6 +48,10 @@ class Headings:
         """Of the columns that a spelling names, the nearest before `column`, else the first."""
         places = self._exact.get(spelling.strip()) or self._compact.get(compact(spelling)) or []
         return max((place for place in places if place < column), default=min(places, default=None))
+
+
+def _with_unit(heading: str, unit: str) -> str:
+    return heading if compact(heading).endswith(compact(unit)) else f"{heading} {unit}"
 
 
 def _places(names: Sequence[str]) -> dict[str, list[int]]:
@@ -164,13 +157,25 @@ class Vocabulary:
             columns = {heading: m for heading, m in found if m.signal == signal}
             if columns:
                 fields[signal] = _signal_columns(signal, columns)
-        # of several, the first by its word: a column of the event's timestamp may stand beside the samples' times
-        times = [(heading, m.unit) for heading, m in found if m.signal is None and m.unit]
-        if times:
-            spoken = dict(zip(headings.written, headings.spoken, strict=True))
-            heading, unit = min(times, key=lambda time: self._clocks.index(compact(spoken[time[0]])))
-            fields["time"] = {"column": heading, "unit": unit}
+        time = self.time(headings)
+        if time is not None:
+            fields["time"] = time
         return mappings.Mapping.model_validate(fields)
+
+    def time(self, headings: Headings) -> mappings.TimeColumn | None:
+        """The column of times that a table's headings name, with its unit.
+
+        Of several the first by its word: a column of the event's timestamp may stand beside the samples' times.
+        """
+        found: list[tuple[int, str, str]] = []
+        for heading, said in zip(headings.written, headings.spoken, strict=True):
+            meaning = self.understand(said)
+            if meaning is not None and meaning.signal is None and meaning.unit is not None:
+                found.append((self._clocks.index(compact(said)), heading, meaning.unit))
+        if not found:
+            return None
+        _, column, unit = min(found)
+        return mappings.TimeColumn.model_validate({"column": column, "unit": unit})
 
 
 def _units(words_and_units: Mapping[str, Any]) -> list[tuple[str | None, str]]:

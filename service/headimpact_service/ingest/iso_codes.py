@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 
 from headimpact.recording import SignalName
-from headimpact_service.ingest.headings import compact
+from headimpact_service.ingest.spelling import compact
 
 RESULTANT = "r"
 

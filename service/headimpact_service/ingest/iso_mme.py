@@ -16,11 +16,11 @@ from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, curve_fault
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
-from headimpact_service.ingest.headings import compact
 from headimpact_service.ingest.iso_codes import HeadCode, head_code, is_time, unit_of
 from headimpact_service.ingest.iso_mme_files import Header, listed_channels, read_channel, read_header
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.stamps import nominal_rate
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.times import TimeError, instant

@@ -23,7 +23,7 @@ from headimpact_service.ingest.impact_json import (
 )
 
 MAX_SPELLINGS = 20
-TIME_UNITS = {"s": 1e3, "ms": 1.0, "us": 1e-3}
+TIME_UNITS = {"s": 1e3, "ms": 1.0, "us": 1e-3, "ns": 1e-6}
 """Units of a time column, in milliseconds."""
 
 
@@ -40,7 +40,7 @@ class TimeColumn(Strict):
     """A column of stamps."""
 
     column: Heading
-    unit: Literal["s", "ms", "us"]
+    unit: Literal["s", "ms", "us", "ns"]
 
 
 Times = Annotated[list[TimeColumn], Field(min_length=1, max_length=MAX_SPELLINGS), BeforeValidator(_as_list)]

@@ -74,4 +74,16 @@ def _seconds(track: Track, origin: float) -> FloatArray:
     stamps = np.empty(0) if track.stamps is None else track.stamps
     if track.milliseconds == 1000.0:
         return stamps
-    return (stamps if track.milliseconds == 1.0 else (stamps - origin) * track.milliseconds) / 1000.0
+    if track.milliseconds == 1.0:
+        return stamps / 1000.0
+    return _without_noise(stamps - origin, origin) * track.milliseconds / 1000.0
+
+
+def _without_noise(elapsed: FloatArray, origin: float) -> FloatArray:
+    """Time since an origin, rounded to the digits that its stamps could hold: nanoseconds from 1970 are to 256."""
+    noise = 2.0 * float(np.spacing(abs(origin)))
+    if noise < 1.0:
+        return elapsed
+    grid = 10.0 ** np.ceil(np.log10(noise))
+    rounded: FloatArray = np.rint(elapsed / grid) * grid
+    return rounded

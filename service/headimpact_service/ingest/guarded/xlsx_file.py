@@ -25,6 +25,8 @@ from headimpact_service.ingest.guarded.contents import (
     checked_text,
     unreadable,
 )
+from headimpact_service.ingest.heading_rows import are_units
+from headimpact_service.ingest.spelling import known_units
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
 
@@ -70,7 +72,8 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
 
 
 def warm_up() -> None:
-    """Read a workbook of our own, so that every library is loaded."""
+    """Read a workbook of our own, so that every library is loaded, and every file of ours that is needed."""
+    known_units()
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, part in _SMALLEST.items():
@@ -86,6 +89,7 @@ class _Block:
 
     columns: list[int]
     headings: list[str]
+    units: list[str]
     rows: list[Row] = field(default_factory=list)
 
     def cells(self, place: int) -> list[Any]:
@@ -98,11 +102,11 @@ class SheetTable:
     """The blocks of one sheet, side by side."""
 
     parted = False
-    units: dict[int, str] = {}  # noqa: RUF012 - a sheet has its units in its headings
 
     def __init__(self, blocks: list[_Block]) -> None:
         """Headings of all blocks, in their order."""
         self.headings = checked_headings(heading for block in blocks for heading in block.headings)
+        self.units = dict(enumerate(checked_headings(unit for block in blocks for unit in block.units)))
         self._places = [(block, place) for block in blocks for place in range(len(block.columns))]
         self._rows = max(len(block.rows) for block in blocks)
 
@@ -132,6 +136,7 @@ class SheetTable:
 def _blocks(sheet: CalamineSheet) -> list[_Block]:
     """Rows below the headings they belong to; rows without a number are words between them."""
     blocks: list[_Block] = []
+    above: Row = []
     before: Row = []
     empty: list[Row] = []
     for row in sheet.iter_rows():
@@ -139,15 +144,30 @@ def _blocks(sheet: CalamineSheet) -> list[_Block]:
             empty.append(row)
             continue
         if _has_number(row):
-            columns = _named_columns(before)
-            if len(columns) > 1 and sum(_is_number(row[column]) for column in columns) > 1:
-                blocks.append(_Block(columns, [before[column].strip() for column in columns]))
+            block = _begun(above, before)
+            if block is not None and sum(_is_number(row[column]) for column in block.columns) > 1:
+                blocks.append(block)
                 empty = []
             if blocks:
                 blocks[-1].rows += [*empty, row]
                 empty = []
-        before = row
+        above, before = before, row
     return blocks
+
+
+def _begun(above: Row, before: Row) -> _Block | None:
+    """The block whose headings are the row before its numbers, or the one above that where it is a row of units."""
+    has_units = bool(_named_columns(above)) and are_units(list(map(_word, above)), list(map(_word, before)))
+    headings, units = (above, before) if has_units else (before, [])
+    columns = _named_columns(headings)
+    if len(columns) < 2:
+        return None
+    said = [_word(units[column]) if column < len(units) else "" for column in columns]
+    return _Block(columns, [headings[column].strip() for column in columns], said)
+
+
+def _word(cell: Any) -> str:  # noqa: ANN401 - any cell
+    return cell if isinstance(cell, str) else ""
 
 
 def _holds_nothing(row: Row) -> bool:

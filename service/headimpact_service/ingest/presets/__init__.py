@@ -76,10 +76,18 @@ def _with_names(mapping: Mapping, headings: Headings) -> Mapping:
     added: dict[str, Any] = {name: getattr(generic, name) for name in fields if getattr(mapping, name) is None}
     if not mapping.group_by:
         added["group_by"] = generic.group_by
+    if not _has_times(mapping, headings) and (time := _vocabulary(_generic().name).time(headings)) is not None:
+        added["time"] = [time]
     reading = {name: spelled for name, spelled in (generic.reading or {}).items() if headings.find(spelled) is not None}
     if reading:
         added["reading"] = reading | (mapping.reading or {})
     return mapping.model_copy(update=added)
+
+
+def _has_times(mapping: Mapping, headings: Headings) -> bool:
+    """Whether one of the layout's own columns of times is there."""
+    own = [columns.time or () for name in SIGNALS if (columns := mapping.columns_of(name)) is not None]
+    return any(headings.nearest(time.column, 0) is not None for times in (mapping.time or (), *own) for time in times)
 
 
 def _with_units(mapping: Mapping, headings: Headings) -> Mapping:

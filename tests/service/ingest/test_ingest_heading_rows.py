@@ -1,0 +1,103 @@
+"""What stands above a table's samples: headings, a row of units, a program's own lines; and how times are counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ingest_files import GENERIC, codes, csv_text, one, refused, six_axis
+
+from headimpact.preparation import prepare
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.record import ImpactRecord
+
+UNITS = "s,g,g,g,rad/s,rad/s,rad/s"
+
+
+def samples_of(record: ImpactRecord) -> np.ndarray:
+    recording = record.recording
+    assert recording.linear_acceleration is not None
+    assert recording.angular_velocity is not None
+    return np.concatenate((recording.linear_acceleration.values, recording.angular_velocity.values), axis=1)
+
+
+def with_rows(*rows: str, headings: str = GENERIC) -> str:
+    """The usual table with rows of its own in place of its headings."""
+    return "\n".join([*rows, *csv_text(heading=headings).splitlines()[1:]])
+
+
+class TestTop:
+    """What stands above the samples."""
+
+    WORDS = "Time,Accel X,Accel Y,Accel Z,Gyro X,Gyro Y,Gyro Z"
+
+    @pytest.mark.parametrize(
+        "units",
+        [UNITS, "[s],[g],[g],[g],[rad/s],[rad/s],[rad/s]", "(s),(g),(g),(g),(rad/s),(rad/s),(rad/s)", f"{UNITS},"],
+    )
+    def test_a_row_of_units_below_the_headings_is_one(self, units):
+        record = one(with_rows(self.WORDS, units))
+        expected = one(csv_text())
+        assert np.array_equal(samples_of(record), samples_of(expected))
+        assert record.recording.angular_velocity.unit == "rad/s"
+
+    def test_units_in_both_places_are_said_twice(self):
+        assert samples_of(one(with_rows(GENERIC, UNITS))).shape == (40, 6)
+
+    def test_units_that_are_not_known_are_no_row_of_units(self):
+        problem = refused(with_rows(GENERIC, "V,V,V,V,V,V,V"))
+        assert codes(problem) == [(None, "missing-sample")]
+
+    def test_a_mapping_names_the_headings_above_a_row_of_units(self):
+        columns = {"unit": "g", "x": "Accel X", "y": "Accel Y", "z": "-Accel Z"}
+        mapping = Mapping.model_validate({"linear_acceleration": columns, "time": {"column": "Time", "unit": "s"}})
+        found = one(with_rows(self.WORDS, UNITS), mapping=mapping).recording.linear_acceleration
+        assert found is not None
+        assert np.array_equal(found.values, six_axis()[:, :3] * [1, 1, -1])
+
+    @pytest.mark.parametrize(
+        "above",
+        [
+            ["Recording of 2024"],
+            ["Device: X1", "Serial: 42", "Sample Rate: 1000", ""],
+            ["Device,X1", "Sample Rate,1000", ""],
+            ["Device,X1,,,,,", "Rate,1000,,,,,"],
+            ["Head,,,,,,"],
+        ],
+    )
+    @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+    def test_words_above_the_headings_are_passed_over(self, above, delimiter):
+        text = "\n".join([*above, csv_text()]).replace(",", delimiter)
+        assert np.array_equal(samples_of(one(text)), samples_of(one(csv_text())))
+
+    def test_rows_below_the_headings_are_counted_from_there(self):
+        lines = csv_text().splitlines()
+        lines[5] = lines[5] + ",1"
+        assert "from line 2 on" in refused("\n".join(lines)).detail
+        above = ["Device: X1", "", lines[0], UNITS]
+        assert "from line 5 on" in refused("\n".join([*above, *lines[1:]])).detail
+
+    def test_a_first_row_of_cells_that_hold_nothing_is_no_heading(self):
+        lines = csv_text().splitlines()
+        problem = refused("\n".join([lines[0], "NA,NA,NA,NA,NA,NA,NA", *lines[1:]]))
+        assert codes(problem) == [(None, "missing-sample")]
+
+    def test_numbers_without_headings_are_refused(self):
+        problem = refused("\n".join(csv_text().splitlines()[1:]))
+        assert problem.slug == "unreadable-file"
+
+
+def test_times_may_be_nanoseconds():
+    text = csv_text().replace("t_s", "timestamp_ns", 1)
+    heading, *lines = text.splitlines()
+    stamped = [f"{1_700_000_000_000_000_000 + n * 1_000_000},{line.partition(',')[2]}" for n, line in enumerate(lines)]
+    record = one("\n".join([heading, *stamped]))
+    assert prepare(record.recording).kinematics.sample_rate_hz == 1000.0
+
+
+def test_a_column_of_times_counts_beside_the_columns_of_a_device_that_has_none():
+    heading = "Time (ms),Linear Accel X (g),Linear Accel Y (g),Linear Accel Z (g)"
+    heading += ",Rotational Vel X (rad/s),Rotational Vel Y (rad/s),Rotational Vel Z (rad/s)"
+    heading += ",Rotational Accel X (rad/s^2),Rotational Accel Y (rad/s^2),Rotational Accel Z (rad/s^2)"
+    record = one(csv_text(np.hstack([six_axis(), six_axis()[:, 3:]]), heading=heading, rate_hz=2.0))
+    assert record.metadata["preset"] == "athlete_intelligence"
+    assert prepare(record.recording).kinematics.sample_rate_hz == 2000.0
