@@ -29,11 +29,12 @@ from headimpact_service.ingest.dts_header import (
 )
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
-from headimpact_service.ingest.iso_codes import HeadCode, head_code, unit_of
+from headimpact_service.ingest.iso_codes import HeadCode, head_code
 from headimpact_service.ingest.iso_mme_files import NO_VALUE, decoded
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
+from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.stamps import follows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
@@ -53,7 +54,7 @@ def is_dts(head: bytes) -> bool:
     """Whether a text file begins with the rows of a DTS header: a rate and the channels' codes or units."""
     rows = [line.split(_delimiter(line)) for line in decoded_head(head)[:MAX_HEADER_ROWS]]
     told = {name for row in rows if (name := key_of(row[0])) is not None and len(row) > 1}
-    return "rate" in told and "code" in told
+    return not told.isdisjoint({"rate", "rate_khz"}) and "code" in told
 
 
 def decoded_head(head: bytes) -> list[str]:
@@ -127,13 +128,13 @@ class _Data:
         """Look at the header only; columns are read as they are asked for."""
         self.header = header
         codes = header.fields.get("code", [])
-        names = header.fields.get("name", [])
+        names = header.names
         self.channels = max(len(codes), len(names), len(header.fields.get("unit", [])))
         if not 1 <= self.channels <= MAX_CHANNELS:
             raise Problem("unreadable-file", f"A file may have 1 to {MAX_CHANNELS} channels.")
         self.rows = [without_empty_end(row) for row in rows]
         self.first = self._first_column()
-        rate = header.number("rate", "The sample rate")
+        rate = header.rate_hz
         if rate is None or rate <= 0.0:
             raise curve_fault("The header gives no sample rate.", "rate-missing")
         self.rate = rate
@@ -212,7 +213,7 @@ class _Data:
         return said[:40].lower() if said else code.filtering
 
     def _curve(self, code: HeadCode, index: int) -> Curve:
-        unit = unit_of(code.signal, self.header.of_channel("unit", index))
+        unit = unit_spelled(code.signal, self.header.of_channel("unit", index))
         if unit is None:
             raise curve_fault(f"The unit of {self.named(index)} is none that is known for it.", "unit-missing")
         values = self.values(index)
@@ -247,8 +248,8 @@ class _Channels:
         self.units: Mapping[int, str] = {i: data.header.of_channel("unit", i) for i in range(data.channels)}
 
     def _heading(self, index: int) -> str:
-        header = self._data.header
-        return header.of_channel("code", index) or header.of_channel("name", index) or f"channel {index + 1}"
+        header, names = self._data.header, self._data.header.names
+        return header.of_channel("code", index) or (names[index] if index < len(names) else f"channel {index + 1}")
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """All rows at once: a file holds one record."""

@@ -13,17 +13,21 @@ from headimpact_service.ingest.spelling import compact
 
 MAX_HEADER_ROWS = 200
 
-# Keys without case, spaces and signs, by the beginning that all spellings share.
+# Keys without case, spaces and signs; of several names of the channels, the first kind that there is.
 _KEYS = {
-    "rate": ("samplerate", "samplingrate"),
-    "code": ("isochannelcode", "isocode"),
-    "unit": ("engineeringunit", "eu", "unit"),
-    "filter": ("softwarefilter",),
-    "name": ("channeldescription", "channelname", "description", "location"),
-    "after": ("postzero", "numberofpostzero", "posttriggerp"),
-    "points": ("numberofpts", "numberofpoints", "totalpts", "totalpoints"),
+    "rate": re.compile(r"(sample|sampling)(rate|frequency)(hz|sps|samplessec|samplespersecond)?"),
+    "rate_khz": re.compile(r"(sample|sampling)(rate|frequency)khz"),
+    "code": re.compile(r"iso(channel)?code"),
+    "unit": re.compile(r"engineeringunits?|eu|units?"),
+    "filter": re.compile(r"softwarefilter[a-z]*"),
+    "after": re.compile(r"(numberof)?post(zero|trig(ger)?)(data)?(p|pts|points|samples)?"),
+    "points": re.compile(r"(number(of)?|total(number)?(of)?)(data)?(pts|points|samples)(total)?"),
+    "description": re.compile(r"channeldescriptions?|sensordescriptions?"),
+    "name": re.compile(r"channelnames?"),
+    "other name": re.compile(r"descriptions?|locations?"),
 }
-_BEFORE = re.compile(r"(?:numberof|no)?pre(?:zero|trig(?:ger)?)(?:data|time)?([a-z]*)")
+_NAMES = ("description", "name", "other name")
+_BEFORE = re.compile(r"(?:numberof)?pre(?:zero|trig(?:ger)?)(?:data|time)?([a-z]*)")
 _POINTS = frozenset({"", "p", "pt", "pts", "point", "points", "sample", "samples"})
 _SECONDS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
@@ -47,6 +51,18 @@ class Header:
         if len(cells) == 1:
             return cells[0]
         return cells[index] if index < len(cells) else ""
+
+    @property
+    def names(self) -> list[str]:
+        """What the channels are called: a row with a name for each, or for the only one."""
+        rows = [self.fields[key] for key in _NAMES if key in self.fields]
+        return max(rows, key=len, default=[])
+
+    @property
+    def rate_hz(self) -> float | None:
+        """The sample rate that all channels share."""
+        kilo = self.number("rate_khz", "The sample rate")
+        return self.number("rate", "The sample rate") if kilo is None else 1000.0 * kilo
 
     def number(self, key: str, what: str) -> float | None:
         """A number that all channels share."""
@@ -95,7 +111,7 @@ def key_of(cell: str) -> str | None:
     if _unit_before(cell) is not None:
         return "before"
     plain = compact(cell.strip().strip('"'))
-    return next((name for name, spellings in _KEYS.items() if plain.startswith(spellings)), None)
+    return next((name for name, spelling in _KEYS.items() if spelling.fullmatch(plain)), None)
 
 
 def _unit_before(cell: str) -> str | None:

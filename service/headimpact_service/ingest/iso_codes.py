@@ -11,7 +11,6 @@ import re
 from dataclasses import dataclass
 
 from headimpact.recording import SignalName
-from headimpact_service.ingest.spelling import compact
 
 RESULTANT = "r"
 
@@ -26,22 +25,6 @@ _AXES = {"X": "x", "Y": "y", "Z": "z", "R": RESULTANT}
 _CENTRE = frozenset({"00", "CG"})
 FILTERS = {"0": "none", "P": "prefiltered", "A": "CFC1000", "B": "CFC600", "C": "CFC180", "D": "CFC60", "S": "special"}
 """What the last letter says of the filtering before the data were written, the weakest first."""
-
-# Units as laboratories spell them, without case, spaces and signs.
-_UNITS: dict[SignalName, dict[str, str]] = {
-    "linear_acceleration": {
-        **dict.fromkeys(("g", "gs", "gn"), "g"),
-        **dict.fromkeys(("ms2", "mss", "msec2", "mps2"), "m/s^2"),
-    },
-    "angular_velocity": {
-        **dict.fromkeys(("rads", "radsec", "radps"), "rad/s"),
-        **dict.fromkeys(("degs", "degsec", "degps", "dps", "degreess", "degreessec"), "deg/s"),
-    },
-    "angular_acceleration": {
-        **dict.fromkeys(("rads2", "radss", "radsec2", "radps2"), "rad/s^2"),
-        **dict.fromkeys(("degs2", "degss", "degsec2", "dps2", "degps2"), "deg/s^2"),
-    },
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +64,3 @@ def is_time(text: str) -> bool:
     """Whether a code is that of a channel of times, which other channels refer to."""
     code = text.strip().upper()
     return _CODE.fullmatch(code) is not None and code[2:6] in {"TIRS", "TIME"}
-
-
-def unit_of(signal: SignalName, text: str | None) -> str | None:
-    """The unit that a header names, if it is one of the signal's."""
-    return None if text is None else _UNITS[signal].get(compact(text))

@@ -16,11 +16,11 @@ from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, curve_fault
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
-from headimpact_service.ingest.iso_codes import HeadCode, head_code, is_time, unit_of
+from headimpact_service.ingest.iso_codes import HeadCode, head_code, is_time
 from headimpact_service.ingest.iso_mme_files import Header, listed_channels, read_channel, read_header
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
-from headimpact_service.ingest.spelling import compact
+from headimpact_service.ingest.spelling import compact, unit_spelled
 from headimpact_service.ingest.stamps import nominal_rate
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.times import TimeError, instant
@@ -138,7 +138,7 @@ class _Test:
 
     def _curve(self, code: HeadCode, number: int) -> Curve:
         header, values = self._file(number)
-        unit = unit_of(code.signal, header.text("unit"))
+        unit = unit_spelled(code.signal, header.text("unit"))
         if unit is None:
             raise curve_fault(f"The unit of {_named(code, number)} is none that is known for it.", "unit-missing")
         stamps, rate = self._stamps(header, values.size, _named(code, number))

@@ -11,6 +11,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_rules import required_axes
 from headimpact_service.ingest.mapping import TIME_UNITS, DateAndTime, Mapping, SignalColumns
+from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.unread import NOTHING_UNREAD, Unread, unread_columns
 
 
@@ -162,7 +163,7 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: bo
     _require_distinct(name, (x, y, z))
     first = min(component.column for component in (x, y, z) if component.column is not None)
     return SignalLayout(
-        unit=_unit(name, columns),
+        unit=_unit(name, columns, _units_beside(name, (x, y, z), headings)),
         components=(x, y, z),
         clock=_own_clock(name, columns, headings, first, required=required),
         resultant=None if columns.resultant is None else headings.find(columns.resultant),
@@ -190,20 +191,34 @@ def _own_clock(
     for time in columns.time or ():
         column = headings.nearest(time.column, first)
         if column is not None:
-            return Clock(column, TIME_UNITS[time.unit])
+            return _clock_in(column, time.unit, headings)
     if required and columns.time:
         raise _missing(f"The column of the times of {name} was not found.", f"/{name}/time")
     return None
 
 
-def _unit(name: SignalName, columns: SignalColumns) -> str:
-    if columns.unit is None:
+def _units_beside(name: SignalName, components: Sequence[Component], headings: Headings) -> set[str]:
+    """The units that stand beside the headings of a signal, as far as they are known."""
+    told = (headings.units.get(component.column) for component in components if component.column is not None)
+    return {unit for text in told if (unit := unit_spelled(name, text)) is not None}
+
+
+def _unit(name: SignalName, columns: SignalColumns, beside: set[str]) -> str:
+    """The unit of a signal: as the mapping says or, where it says none, as the file does; they must agree."""
+    said = beside if columns.unit is None else {columns.unit} | beside
+    if len(said) > 1:
+        raise layout_problem(
+            f"The columns of the {name} are said to be in {' and in '.join(sorted(said))}.",
+            code="units-differ",
+            pointer=f"/{name}/unit",
+        )
+    if not said:
         raise layout_problem(
             f"The unit of the {name} is neither in its headings nor in the preset: give it in a mapping.",
             code="unit-missing",
             pointer=f"/{name}/unit",
         )
-    return columns.unit
+    return said.pop()
 
 
 def _component(spellings: Sequence[str] | None, headings: Headings) -> Component | None:
@@ -221,10 +236,20 @@ def _clock(mapping: Mapping, headings: Headings, required: bool, *, own: bool) -
     for time in () if own else mapping.time or ():
         column = headings.find([time.column])
         if column is not None:
-            return Clock(column, TIME_UNITS[time.unit])
+            return _clock_in(column, time.unit, headings)
     if required and not own:
         raise _missing("The column of the time was not found.", "/time")
     return None
+
+
+def _clock_in(column: int, unit: str, headings: Headings) -> Clock:
+    """A column of stamps in a unit, unless the file says another beside its heading."""
+    beside = unit_spelled("time", headings.units.get(column))
+    if beside not in {None, unit}:
+        raise layout_problem(
+            f"The column of the time is said to be in {unit} and in {beside}.", code="units-differ", pointer="/time"
+        )
+    return Clock(column, TIME_UNITS[unit])
 
 
 def _context(mapping: Mapping, headings: Headings, required: frozenset[str]) -> dict[str, int]:

@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 
 _NO_SIGN_OR_LETTER = re.compile(r"[^0-9a-z]+")
-_WORDED = str.maketrans({"°": "deg", "µ": "u", "μ": "u", "ω": "omega", "α": "alpha"})
+_WORDED = str.maketrans({"°": "deg", "º": "deg", "µ": "u", "μ": "u", "ω": "omega", "α": "alpha"})
 MAX_COMPACT = 200
 _VOCABULARY = files("headimpact_service.ingest") / "presets" / "generic_six_axis.toml"
 
@@ -21,12 +21,21 @@ def compact(heading: str) -> str:
 
 
 @cache
+def _units() -> dict[str, dict[str, str]]:
+    """Of time and of each signal, every spelling of a unit, as :func:`compact` has it, and the unit."""
+    vocabulary = tomllib.loads(_VOCABULARY.read_text("utf-8"))["vocabulary"]
+    return {
+        quantity: {compact(spelling): unit for unit, spellings in said["units"].items() for spelling in spellings}
+        for quantity, said in vocabulary.items()
+    }
+
+
+@cache
 def known_units() -> frozenset[str]:
     """Every spelling of a unit of time or of a signal, as :func:`compact` has it."""
-    vocabulary = tomllib.loads(_VOCABULARY.read_text("utf-8"))["vocabulary"]
-    return frozenset(
-        compact(spelling)
-        for said in vocabulary.values()
-        for spellings in said["units"].values()
-        for spelling in spellings
-    )
+    return frozenset(spelling for spellings in _units().values() for spelling in spellings)
+
+
+def unit_spelled(signal: str, text: str | None) -> str | None:
+    """The unit that a text names, if it is one of the signal's."""
+    return None if text is None else _units()[signal].get(compact(text))

@@ -257,3 +257,45 @@ def test_any_damage_is_read_or_refused(damage):
 def test_a_wave_of_each_channel_is_its_own():
     recording = one(dts()).recording
     np.testing.assert_allclose(recording.angular_velocity.values[:, 2], half_sine(SAMPLES, np.degrees(-4.0)))
+
+
+class TestKeys:
+    """What a row of the header says, by its first cell."""
+
+    @pytest.mark.parametrize(
+        "row",
+        [
+            "Sample Rate Max (Hz),100000",
+            "Sample Rate Requested (Hz),10000",
+            "Unit System,Metric",
+            "EU File,abc",
+            "Description,Head drop",
+            "Location,Hall 3",
+        ],
+    )
+    def test_a_row_that_begins_like_another_is_not_taken_for_it(self, row):
+        named = {"Channel Description": ["Head 1", "Head 2", "Head 3", "Head 4", "Head 5", "Head 6"]}
+        text = dts(changes=named)
+        record = one(f"{row}\r\n{text}")
+        assert record.recording.angular_velocity.sample_rate_hz == 20_000.0
+        np.testing.assert_array_equal(
+            record.recording.linear_acceleration.values, one(text).recording.linear_acceleration.values
+        )
+        columns = {"unit": "g", "x": "Head 4", "y": "Head 5", "z": "Head 6"}
+        uncoded = text.replace("ISO Channel Code", "Channel Code")
+        mapped = one(
+            f"{row}\r\n{uncoded}", preset="dts", mapping=Mapping.model_validate({"linear_acceleration": columns})
+        )
+        assert peaks(mapped, "linear_acceleration")[0] == 30.0
+
+    def test_a_rate_may_be_in_kilohertz(self):
+        text = dts(time_column=False).replace("Sample Rate (Hz)", "Sampling Rate (kHz)").replace("20000", "20")
+        assert one(text).recording.angular_velocity.sample_rate_hz == 20_000.0
+
+    def test_the_units_of_channels_without_codes_are_those_of_the_header(self):
+        uncoded = dts().replace("ISO Channel Code", "Channel Code")
+        named = {"x": "Head 4", "y": "Head 5", "z": "Head 6"}
+        record = one(uncoded, preset="dts", mapping=Mapping.model_validate({"linear_acceleration": named}))
+        assert record.recording.linear_acceleration.unit == "g"
+        wrong = Mapping.model_validate({"linear_acceleration": named | {"unit": "m/s^2"}})
+        assert codes(refused(uncoded, preset="dts", mapping=wrong))[0][1] == "units-differ"

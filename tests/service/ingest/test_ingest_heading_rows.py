@@ -101,3 +101,27 @@ def test_a_column_of_times_counts_beside_the_columns_of_a_device_that_has_none()
     record = one(csv_text(np.hstack([six_axis(), six_axis()[:, 3:]]), heading=heading, rate_hz=2.0))
     assert record.metadata["preset"] == "athlete_intelligence"
     assert prepare(record.recording).kinematics.sample_rate_hz == 2000.0
+
+
+def test_units_below_the_headings_are_those_of_a_mapping_s_columns():
+    named = {"x": "Accel X", "y": "Accel Y", "z": "Accel Z"}
+    clock = {"column": "Time", "unit": "s"}
+    text = with_rows(TestTop.WORDS, UNITS)
+
+    def mapped(**fields):
+        return Mapping.model_validate({"linear_acceleration": named, "time": clock} | fields)
+
+    assert one(text, mapping=mapped()).recording.linear_acceleration.unit == "g"
+    other = mapped(linear_acceleration=named | {"unit": "m/s^2"})
+    assert codes(refused(text, mapping=other))[0][1] == "units-differ"
+    assert codes(refused(text, mapping=mapped(time={"column": "Time", "unit": "ms"})))[0][1] == "units-differ"
+
+
+@pytest.mark.parametrize("unit", ["rad s-1", "rad·s⁻¹", "rad.s-1", "rad/s"])
+def test_units_may_be_written_with_exponents(unit):
+    assert one(csv_text(heading=GENERIC.replace("_rad_s", f" [{unit}]"))).recording.angular_velocity.unit == "rad/s"
+
+
+@pytest.mark.parametrize("unit", ["deg·s⁻¹", "º/s", "°/s", "degrees/s"])
+def test_degrees_may_be_written_with_exponents(unit):
+    assert one(csv_text(heading=GENERIC.replace("_rad_s", f" [{unit}]"))).recording.angular_velocity.unit == "deg/s"

@@ -11,9 +11,10 @@ from laboratory import ISO_CODES, SAMPLES, channel, channels, iso_mme, text
 
 from headimpact.filtering import PAPER
 from headimpact.preparation import prepare
-from headimpact_service.ingest.iso_codes import head_code, unit_of
+from headimpact_service.ingest.iso_codes import head_code
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.spelling import unit_spelled
 
 AX = "11HEADCG00H3ACXA"
 
@@ -93,7 +94,7 @@ class TestUnits:
         ],
     )
     def test_a_unit_is_read_however_it_is_written_and_never_guessed(self, signal, written, unit):
-        assert unit_of(signal, written) == unit
+        assert unit_spelled(signal, written) == unit
 
     def test_a_unit_that_is_none_of_the_signal_s_is_422_and_names_the_channel(self):
         problem = refused(changed(of_unit="km/h"))
