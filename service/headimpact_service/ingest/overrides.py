@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from headimpact.recording import Recording, Signal
+from headimpact_service.ingest.labels import label_fault
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.ingest.stamps import DRIFT, follows
 
 
 def with_options(record: ImpactRecord, options: ImportOptions) -> ImpactRecord:
@@ -39,4 +41,17 @@ def _recording(recording: Recording, options: ImportOptions) -> Recording:
 
 
 def _at_rate(signal: Signal, sample_rate_hz: float) -> Signal:
+    """A signal at the sender's rate; 422 where the file says another."""
+    if signal.time_s is not None:
+        agrees = follows(signal.time_s * 1000.0, sample_rate_hz)
+    else:
+        own = signal.sample_rate_hz
+        agrees = own is None or abs(own - sample_rate_hz) <= DRIFT * own
+    if not agrees:
+        raise label_fault(
+            f"The file's own times or rate are not those of {sample_rate_hz:g} samples per second: leave out the rate "
+            "beside it.",
+            "rate-differs",
+            parameter="sample_rate_hz",
+        )
     return replace(signal, sample_rate_hz=sample_rate_hz, time_s=None)

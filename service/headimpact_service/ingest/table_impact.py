@@ -250,25 +250,31 @@ class TableImpact:
     def _track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
         signal = self.layout.signals[name]
         clock = signal.clock or self.layout.clock
-        own_rate = signal.sample_rate_hz if signal.clock is None else None
-        asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
-        rate = self.options.sample_rate_hz or self._said_rate(reading, clock, rows) or own_rate or asked
         if signal.clock is not None or signal.sample_rate_hz is not None or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
+        rate = self._said_rate(signal, clock, reading, rows)
         if clock is None:
             return self._counted(Track(name, rows, rate or self.mapping.sample_rate_hz, None, 1.0))
         return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
 
-    def _said_rate(self, reading: Reading, clock: Clock | None, rows: Rows) -> float | None:
-        """The rate that the impact's own row says; 422 where its stamps say another."""
-        rate = reading.sample_rate_hz
+    def _said_rate(self, signal: SignalLayout, clock: Clock | None, reading: Reading, rows: Rows) -> float | None:
+        """The rate that the sender, the impact's row or the mapping says; 422 where its stamps say another.
+
+        A signal that has a rate of its own, and no times, does not go by those that the others share.
+        """
+        asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
+        said = self.options.sample_rate_hz or reading.sample_rate_hz
+        if said is None and signal.sample_rate_hz is not None and signal.clock is None:
+            return signal.sample_rate_hz
+        rate = said or signal.sample_rate_hz or asked
         if rate is None or clock is None:
             return rate
         stamps = self._stamps(clock.column, rows) * clock.milliseconds
         if not follows(stamps[np.isfinite(stamps)], rate):
             raise label_fault(
-                "The impact's times do not go on at its sample_rate_hz: they leave out samples, begin anew or are of "
-                "another rate.",
+                f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew "
+                "or are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a "
+                "mapping).",
                 "rate-differs",
                 parameter="sample_rate_hz",
             )

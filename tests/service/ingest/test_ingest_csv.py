@@ -13,6 +13,8 @@ from headimpact_service.ingest import csv_format
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 
+TIME = {"column": "t_s", "unit": "s"}
+
 
 def samples_of(record: ImpactRecord) -> np.ndarray:
     recording = record.recording
@@ -242,8 +244,28 @@ def test_no_time_and_no_rate_is_refused_and_a_rate_given_beside_is_taken():
     assert recording.angular_velocity.sample_rate_hz == 2000.0
 
 
-def test_a_rate_given_beside_the_file_overrides_its_times():
-    recording = one(csv_text(), sample_rate_hz=3200.0).recording
+def test_a_rate_given_beside_the_file_stands_for_times_that_go_on_at_it():
+    recording = one(csv_text(), sample_rate_hz=1000.4).recording
+    assert recording.linear_acceleration is not None
+    assert recording.linear_acceleration.sample_rate_hz == 1000.4
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"sample_rate_hz": 3200.0},
+        {"mapping": Mapping(sample_rate_hz=3200.0)},
+        {"mapping": Mapping.model_validate({"angular_velocity": {"sample_rate_hz": 3200, "time": TIME}})},
+    ],
+)
+def test_a_rate_that_the_file_s_own_times_contradict_is_refused(options):
+    problem = refused(csv_text(), **options)
+    assert codes(problem) == [("sample_rate_hz", "rate-differs")]
+    assert "3200" in problem.detail
+
+
+def test_times_that_are_wrong_can_be_left_out_for_a_rate():
+    recording = one(csv_text(), sample_rate_hz=3200.0, mapping=Mapping(time=None)).recording
     assert recording.linear_acceleration is not None
     assert recording.linear_acceleration.sample_rate_hz == 3200.0
 

@@ -203,7 +203,7 @@ def test_fields_beside_the_file_override_what_is_in_it(data: bytes):
         occurred_at=when,
         axes="sae_j211",
         low_pass=NO_FILTER,
-        sample_rate_hz=2000.0,
+        sample_rate_hz=1000.5,
         filename="delivery.json",
     )[0]
     assert isinstance(record, ImpactRecord)
@@ -211,8 +211,23 @@ def test_fields_beside_the_file_override_what_is_in_it(data: bytes):
     assert record.occurred_at == when
     assert record.recording.axes == "sae_j211"
     assert record.recording.low_pass is NO_FILTER
-    assert [signal.sample_rate_hz for _, signal in record.recording.signals()] == [2000.0, 2000.0]
+    assert [signal.sample_rate_hz for _, signal in record.recording.signals()] == [1000.5, 1000.5]
     assert record.metadata == {"format": "json", "file": "delivery.json"}
+
+
+def test_a_rate_beside_the_file_that_the_file_contradicts_is_refused():
+    for kinematics in (body(), stamped()):
+        [problem] = read(json.dumps(kinematics), sample_rate_hz=2000.0)
+        assert codes(problem) == [("sample_rate_hz", "rate-differs")]
+
+
+def stamped() -> dict[str, Any]:
+    sent = body()
+    for name in ("linear_acceleration", "angular_velocity"):
+        signal = sent["kinematics"][name]
+        rate = signal.pop("sample_rate_hz")
+        signal["time_ms"] = [1000.0 * n / rate for n in range(len(signal["x"]))]
+    return sent
 
 
 def test_a_zone_beside_the_file_places_its_local_times():

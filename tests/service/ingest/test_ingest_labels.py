@@ -56,12 +56,10 @@ class TestReading:
 
     def test_what_comes_beside_the_file_counts_more_and_an_empty_cell_says_nothing(self):
         assert one(labelled(axes="sae_j211"), axes="anatomical").recording.axes == "anatomical"
-        assert (
-            one(labelled(filter="none", sample_rate_hz=900), sample_rate_hz=800.0)
-            .recording.signals()[0][1]
-            .sample_rate_hz
-            == 800
-        )
+        [(_, signal), *_] = one(
+            labelled(filter="none", sample_rate_hz=1000.2), sample_rate_hz=1000.4
+        ).recording.signals()
+        assert signal.sample_rate_hz == 1000.4
         assert one(labelled(axes="", filter="", mounting="")).recording.axes == "anatomical"
 
     @pytest.mark.parametrize(
