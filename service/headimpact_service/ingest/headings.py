@@ -9,7 +9,9 @@ from typing import Any
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest import mapping as mappings
-from headimpact_service.ingest.spelling import MAX_COMPACT, compact
+from headimpact_service.ingest.spelling import MAX_COMPACT, compact, without_unit
+
+_TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 
 class Headings:
@@ -87,11 +89,11 @@ class Vocabulary:
         self._telling = self._tell(table)
         for signal in SIGNALS:
             self._learn(signal, table[signal])
-        self._clocks: list[str] = []
-        for word in table["time"]["words"]:
+        self._clocks: dict[str, int] = {}
+        for rank, word in enumerate(table["time"]["words"]):
             for unit, spellings in _units(table["time"]):
                 self._add(compact(word) + spellings, Meaning(None, None, unit))
-                self._clocks.append(compact(word) + spellings)
+                self._clocks.setdefault(compact(word) + spellings, rank)
 
     def _tell(self, table: Mapping[str, Any]) -> dict[str, SignalName]:
         """Spellings of units of rotation: three columns of one are a signal, whatever else they are called."""
@@ -131,11 +133,9 @@ class Vocabulary:
             if stem is not None:
                 signal, axis = self._stems[stem]
                 found.setdefault((signal, name.removeprefix(stem)), {}).setdefault(axis, heading)
-            for signal, rest in self._by_unit(name):
-                for place, axis in enumerate(rest):
-                    if axis in AXES:
-                        alike = f"{rest[:place]}*{rest[place + 1 :]}"
-                        found.setdefault((signal, alike), {}).setdefault(axis, heading)
+            for signal, rest in (*self._by_unit(name), *_by_last_word(said)):
+                for alike, axis in _axes_of(rest):
+                    found.setdefault((signal, alike), {}).setdefault(axis, heading)
         whole = {signal: by_axis for (signal, _), by_axis in found.items() if len(by_axis) == len(AXES)}
         return {signal: [by_axis[axis] for axis in AXES] for signal, by_axis in whole.items()}
 
@@ -157,25 +157,41 @@ class Vocabulary:
             columns = {heading: m for heading, m in found if m.signal == signal}
             if columns:
                 fields[signal] = _signal_columns(signal, columns)
-        time = self.time(headings)
-        if time is not None:
-            fields["time"] = time
+        times = self.time(headings)
+        if times:
+            fields["time"] = times
         return mappings.Mapping.model_validate(fields)
 
-    def time(self, headings: Headings) -> mappings.TimeColumn | None:
-        """The column of times that a table's headings name, with its unit.
+    def time(self, headings: Headings) -> list[mappings.TimeColumn]:
+        """The columns of times that a table's headings name, with their units; of one word, all.
 
-        Of several the first by its word: a column of the event's timestamp may stand beside the samples' times.
+        Of several words the first: a column of the event's timestamp may stand beside the samples' times.
         """
-        found: list[tuple[int, str, str]] = []
+        found: list[tuple[int, mappings.TimeColumn]] = []
         for heading, said in zip(headings.written, headings.spoken, strict=True):
             meaning = self.understand(said)
             if meaning is not None and meaning.signal is None and meaning.unit is not None:
-                found.append((self._clocks.index(compact(said)), heading, meaning.unit))
-        if not found:
-            return None
-        _, column, unit = min(found)
-        return mappings.TimeColumn.model_validate({"column": column, "unit": unit})
+                column = mappings.TimeColumn.model_validate({"column": heading, "unit": meaning.unit})
+                found.append((self._clocks[compact(said)], column))
+        found.sort(key=lambda ranked: ranked[0])
+        return [column for rank, column in found if rank == found[0][0]]
+
+
+def _by_last_word(heading: str) -> Iterator[tuple[SignalName, str]]:
+    """What is left of a heading that ends in a unit of linear acceleration as a word of its own, without it."""
+    rest = without_unit("linear_acceleration", heading)
+    if rest is not None:
+        yield "linear_acceleration", compact(rest) + "|"
+
+
+def _axes_of(rest: str) -> Iterator[tuple[str, str]]:
+    """The letters of a name that may be its axis, each with the name that the other two axes share."""
+    for place, axis in enumerate(rest):
+        if axis in AXES:
+            yield f"{rest[:place]}*{rest[place + 1 :]}", axis
+    for word, axis in _TURNS.items():
+        if word in rest:
+            yield rest.replace(word, "*"), axis
 
 
 def _units(words_and_units: Mapping[str, Any]) -> list[tuple[str | None, str]]:

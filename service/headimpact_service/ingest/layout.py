@@ -54,6 +54,7 @@ class Layout:
 
     signals: dict[SignalName, SignalLayout]
     clock: Clock | None
+    other_clocks: tuple[Clock, ...]
     keys: tuple[int, ...]
     external_id: int | None
     athlete: int | None
@@ -81,7 +82,8 @@ class Layout:
     def numbers(self) -> list[int]:
         """Columns that are read as numbers."""
         signals = self.signals.values()
-        clocks = [clock.column for clock in (self.clock, *(signal.clock for signal in signals)) if clock is not None]
+        all_clocks = (self.clock, *self.other_clocks, *(signal.clock for signal in signals))
+        clocks = [clock.column for clock in all_clocks if clock is not None]
         resultants = [signal.resultant for signal in signals if signal.resultant is not None]
         counted = [] if self.sample_number is None else [self.sample_number]
         return sorted({*clocks, *resultants, *counted, *(column for signal in signals for column in signal.columns)})
@@ -132,9 +134,12 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
             "The columns of no signal were found: name a preset, or send a mapping from columns to signals.",
             code="layout-unknown",
         )
+    own = all(signal.clock for signal in signals.values())
+    clock, *other_clocks = _clocks(mapping, headings, "time" in required, own=own) or [None]
     return Layout(
         signals=signals,
-        clock=_clock(mapping, headings, "time" in required, own=all(signal.clock for signal in signals.values())),
+        clock=clock,
+        other_clocks=tuple(filter(None, other_clocks)),
         keys=_keys(mapping, headings, "group_by" in required),
         external_id=_optional("external_id", mapping.external_id, headings, required),
         athlete=_optional("athlete", mapping.athlete, headings, required),
@@ -231,15 +236,14 @@ def _component(spellings: Sequence[str] | None, headings: Headings) -> Component
     return None
 
 
-def _clock(mapping: Mapping, headings: Headings, required: bool, *, own: bool) -> Clock | None:
-    """The column of stamps that the signals share; none is looked for where each has its own."""
-    for time in () if own else mapping.time or ():
-        column = headings.find([time.column])
-        if column is not None:
-            return _clock_in(column, time.unit, headings)
-    if required and not own:
+def _clocks(mapping: Mapping, headings: Headings, required: bool, *, own: bool) -> list[Clock | None]:
+    """The columns of stamps that the signals share, the one that is read first; none where each has its own."""
+    if own:
+        return []
+    found = [(column, time.unit) for time in mapping.time or () if (column := headings.find([time.column])) is not None]
+    if required and not found:
         raise _missing("The column of the time was not found.", "/time")
-    return None
+    return [_clock_in(column, unit, headings) for column, unit in dict(found).items()]
 
 
 def _clock_in(column: int, unit: str, headings: Headings) -> Clock:

@@ -7,11 +7,12 @@ import tomllib
 import unicodedata
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 _NO_SIGN_OR_LETTER = re.compile(r"[^0-9a-z]+")
 _WORDED = str.maketrans({"°": "deg", "º": "deg", "µ": "u", "μ": "u", "ω": "omega", "α": "alpha"})
 MAX_COMPACT = 200
-_VOCABULARY = files("headimpact_service.ingest") / "presets" / "generic_six_axis.toml"
+_PRESET = files("headimpact_service.ingest") / "presets" / "generic_six_axis.toml"
 
 
 def compact(heading: str) -> str:
@@ -21,12 +22,18 @@ def compact(heading: str) -> str:
 
 
 @cache
+def _vocabulary() -> dict[str, Any]:
+    """The words of the generic preset."""
+    found: dict[str, Any] = tomllib.loads(_PRESET.read_text("utf-8"))["vocabulary"]
+    return found
+
+
+@cache
 def _units() -> dict[str, dict[str, str]]:
     """Of time and of each signal, every spelling of a unit, as :func:`compact` has it, and the unit."""
-    vocabulary = tomllib.loads(_VOCABULARY.read_text("utf-8"))["vocabulary"]
     return {
         quantity: {compact(spelling): unit for unit, spellings in said["units"].items() for spelling in spellings}
-        for quantity, said in vocabulary.items()
+        for quantity, said in _vocabulary().items()
     }
 
 
@@ -39,3 +46,20 @@ def known_units() -> frozenset[str]:
 def unit_spelled(signal: str, text: str | None) -> str | None:
     """The unit that a text names, if it is one of the signal's."""
     return None if text is None else _units()[signal].get(compact(text))
+
+
+@cache
+def _written(signal: str) -> tuple[str, ...]:
+    """A signal's units as they are written, the longest first."""
+    units = _vocabulary()[signal]["units"].values()
+    return tuple(sorted({spelling for spellings in units for spelling in spellings}, key=len, reverse=True))
+
+
+def without_unit(signal: str, heading: str) -> str | None:
+    """What stands before a unit of a signal that ends a heading as a word of its own; None where none does."""
+    text = unicodedata.normalize("NFKC", heading[:MAX_COMPACT]).casefold().replace("^", "").rstrip(" )]")
+    for unit in _written(signal):
+        rest = text.removesuffix(unit)
+        if rest != text and rest and not rest[-1].isalnum():
+            return rest
+    return None

@@ -46,9 +46,23 @@ def follows(stamps_ms: FloatArray, rate_hz: float, *, drift: float = DRIFT) -> b
     if not stamps_ms.size:
         return True
     elapsed = np.arange(stamps_ms.size) * 1000.0 / rate_hz
-    rounded_to = next((grid for grid in ROUNDED_TO_MS if _are_multiples(stamps_ms, grid)), 0.0)
     stray = np.abs(stamps_ms - stamps_ms[0] - elapsed)
-    return bool((stray <= NEAR * 1000.0 / rate_hz + rounded_to + drift * elapsed).all())
+    return bool((stray <= NEAR * 1000.0 / rate_hz + _rounded_to(stamps_ms) + drift * elapsed).all())
+
+
+def agree(first_ms: FloatArray, second_ms: FloatArray) -> bool:
+    """Whether two columns of stamps [ms] say the same times, as far as they are rounded; none there says nothing."""
+    there = np.isfinite(first_ms) & np.isfinite(second_ms)
+    one, two = first_ms[there], second_ms[there]
+    if one.size < 2:
+        return True
+    step = min(abs(float(np.median(np.diff(stamps)))) for stamps in (one, two))
+    return bool((np.abs(one - two) <= NEAR * step + max(_rounded_to(one), _rounded_to(two))).all())
+
+
+def _rounded_to(stamps_ms: FloatArray) -> float:
+    """What all stamps are multiples of, of what they may be written to; zero for anything finer."""
+    return next((grid for grid in ROUNDED_TO_MS if _are_multiples(stamps_ms, grid)), 0.0)
 
 
 def _are_multiples(values: FloatArray, grid: float) -> bool:

@@ -35,7 +35,7 @@ from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.row_labels import RowLabels
-from headimpact_service.ingest.stamps import before_zero_ms, follows
+from headimpact_service.ingest.stamps import agree, before_zero_ms, follows
 from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
@@ -169,6 +169,7 @@ class TableImpact:
         mapping, options, reading = self.mapping, self.options, self.reading
         fill_gaps = options.fill_gaps or reading.fill_gaps or bool(mapping.fill_gaps)
         self._require_counted(allow_gaps=fill_gaps)
+        self._require_one_time()
         tracks = self._tracks()
         # The signals before the drop say when the record began, those after it when what is kept begins.
         kept = [self._without_first(track) for track in tracks]
@@ -319,6 +320,19 @@ class TableImpact:
                 f"{self.row + 1} below the headings: some are missing or out of order.",
                 "sample-order",
             )
+
+    def _require_one_time(self) -> None:
+        """Refuse two columns of times that say different things."""
+        clock = self.layout.clock
+        for other in self.layout.other_clocks:
+            assert clock is not None
+            one, two = (self.samples.numbers[found.column][self.rows] * found.milliseconds for found in (clock, other))
+            if not agree(one, two):
+                raise label_fault(
+                    f"Columns {clock.column + 1} and {other.column + 1} both give the times and do not agree: say in a "
+                    "mapping which to take.",
+                    "times-differ",
+                )
 
     def _require_times(self, track: Track) -> None:
         """Refuse a missing time."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from ingest_files import GENERIC, codes, csv_text, one, refused, six_axis
@@ -125,3 +127,31 @@ def test_units_may_be_written_with_exponents(unit):
 @pytest.mark.parametrize("unit", ["deg·s⁻¹", "º/s", "°/s", "degrees/s"])
 def test_degrees_may_be_written_with_exponents(unit):
     assert one(csv_text(heading=GENERIC.replace("_rad_s", f" [{unit}]"))).recording.angular_velocity.unit == "deg/s"
+
+
+def twice_timed(other_ms: Callable[[int], float], heading: str = "time_s", first: str = "time_ms") -> str:
+    """The usual table with two columns of times."""
+    _, *lines = csv_text().splitlines()
+    columns = GENERIC.partition(",")[2]
+    rows = [f"{n - 10},{other_ms(n) / 1000:.6f},{line.partition(',')[2]}" for n, line in enumerate(lines)]
+    return "\n".join([f"{first},{heading},{columns}", *rows])
+
+
+def test_two_columns_of_times_that_agree_are_one_clock():
+    record = one(twice_timed(lambda n: n - 10))
+    assert record.recording.pre_trigger_ms == 10.0
+    assert prepare(record.recording).kinematics.sample_rate_hz == 1000.0
+
+
+@pytest.mark.parametrize("other", [lambda n: 2 * (n - 10), lambda n: n - 20, lambda n: n - 10 + 5 * (n > 30)])
+def test_two_columns_of_times_that_do_not_agree_are_refused(other):
+    problem = refused(twice_timed(other))
+    assert codes(problem) == [(None, "times-differ")]
+    assert "Columns 1 and 2" in problem.detail
+    chosen = Mapping.model_validate({"time": {"column": "time_ms", "unit": "ms"}})
+    assert one(twice_timed(other), mapping=chosen).recording.pre_trigger_ms == 10.0
+
+
+def test_an_event_s_stamps_beside_the_samples_times_are_no_second_clock():
+    record = one(twice_timed(lambda n: 1.7e12 + 7.0 * n, heading="timestamp_s", first="t_ms"))
+    assert record.recording.pre_trigger_ms == 10.0

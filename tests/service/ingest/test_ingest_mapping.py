@@ -608,3 +608,37 @@ def test_any_mapping_is_taken_or_refused(document: dict[str, Any]):
     with suppress(Problem):
         options = ImportOptions.from_fields({"mapping": json.dumps(document)})
         assert statuses(outcome(csv_text(six_axis()), mapping=options.mapping)) <= {413, 422}
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        *(
+            "CG_A{}_g",
+            "head_a{}_g",
+            "la{}_g",
+            "LinearAcc_CG_{} (g)",
+            "Acceleration Head CG {} (g)",
+            "Lin_{}_g",
+            "LA_{} (g)",
+        ),
+        *("{} (g)", "Head {} [m/s^2]", "sensor1 {} m/s²"),
+    ],
+)
+def test_three_columns_in_a_unit_of_acceleration_are_not_passed_over(heading):
+    linear = ",".join(heading.format(axis) for axis in "xyz")
+    problem = refused(csv_text(heading=f"t_s,{linear},wx_rad_s,wy_rad_s,wz_rad_s"))
+    assert codes(problem) == [("/linear_acceleration", "columns-not-read")]
+
+
+@pytest.mark.parametrize(
+    "heading", ["roll_rad_s,pitch_rad_s,yaw_rad_s", "Roll rate (deg/s),Pitch rate (deg/s),Yaw rate (deg/s)"]
+)
+def test_rates_of_turns_by_their_names_are_not_passed_over(heading):
+    problem = refused(csv_text(heading=f"t_s,ax_g,ay_g,az_g,{heading}"))
+    assert codes(problem) == [("/angular_velocity", "columns-not-read")]
+
+
+def test_other_columns_in_g_beside_a_whole_signal_are_none_of_it():
+    record = one(csv_text(np.hstack([six_axis(), six_axis()[:, :3]]), heading=f"{GENERIC},neck_x_g,neck_y_g,neck_z_g"))
+    assert record.recording.linear_acceleration.values[:, 0].max() == six_axis()[:, 0].max()

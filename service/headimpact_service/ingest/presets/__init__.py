@@ -76,8 +76,8 @@ def _with_names(mapping: Mapping, headings: Headings) -> Mapping:
     added: dict[str, Any] = {name: getattr(generic, name) for name in fields if getattr(mapping, name) is None}
     if not mapping.group_by:
         added["group_by"] = generic.group_by
-    if not _has_times(mapping, headings) and (time := _vocabulary(_generic().name).time(headings)) is not None:
-        added["time"] = [time]
+    if not _has_times(mapping, headings) and (times := _vocabulary(_generic().name).time(headings)):
+        added["time"] = times
     reading = {name: spelled for name, spelled in (generic.reading or {}).items() if headings.find(spelled) is not None}
     if reading:
         added["reading"] = reading | (mapping.reading or {})
