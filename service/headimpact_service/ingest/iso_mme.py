@@ -90,6 +90,7 @@ class _Test:
             raise Problem("unreadable-file", f"A set may have at most {MAX_CHANNELS} channels.")
         self.listed = listed_channels(self._read_header(".chn", [path.parent for path in channels] or [folder]))
         self.read: dict[int, tuple[Header, FloatArray]] = {}
+        self.begin: set[bool] = set()  # whether the head's channels say when they begin
 
     def impacts(self) -> Iterator[ImpactRecord | Problem]:
         """The heads of this test."""
@@ -97,7 +98,10 @@ class _Test:
         channels = [c for number in sorted(self.files) if (c := self._channel(number)) is not None]
         occurred_at = self._occurred_at()
         options = self.options
-        for item in head_impacts(channels, options, preset=PRESET, metadata=metadata, notes=self._absent()):
+        known = self._trigger_is_known()
+        for item in head_impacts(
+            channels, options, preset=PRESET, metadata=metadata, notes=self._absent(), trigger_known=known
+        ):
             if isinstance(item, Problem) or occurred_at is None or options.occurred_at is not None:
                 yield item
             else:
@@ -118,6 +122,7 @@ class _Test:
         code = head_code(header.text("channel code") or self.listed.get(number, ""))
         if code is None:
             return None
+        self.begin.add(header.number("time of first sample") is not None or self._refers(header))
         status = " ".join((header.text("data status") or "ok").casefold().split())
         invalid = _INVALID.search(status) is not None
         return HeadChannel(
@@ -147,14 +152,33 @@ class _Test:
 
     def _stamps(self, header: Header, count: int, named: str) -> tuple[FloatArray, float | None]:
         """The channel's times [s] and their rate: implicit in its header, or those of the channel that it refers to."""
-        first, step = header.number("time of first sample"), header.number("sampling interval")
-        if first is not None and step is not None and 0.0 < step < 1.0:
-            stamps: FloatArray = first + step * np.arange(count, dtype=np.float64)
-        else:
+        step, told = self._step(header), header.number("time of first sample")
+        explicit = (header.text("reference channel") or "").casefold() == "explicit"
+        if explicit or step is None or (told is None and self._refers(header)):
             stamps = self._reference(header, count, named)
+        else:
+            stamps = (told or 0.0) + step * np.arange(count, dtype=np.float64)
         if not (np.diff(stamps) > 0).all():
             raise curve_fault(f"The times of {named} must increase.", "time-not-increasing")
         return stamps, nominal_rate(stamps)
+
+    def _step(self, header: Header) -> float | None:
+        """The sampling interval that the header says or, where it says none, the sender [s]."""
+        step = header.number("sampling interval")
+        if step is not None and 0.0 < step < 1.0:
+            return step
+        return None if self.options.sample_rate_hz is None else 1.0 / self.options.sample_rate_hz
+
+    def _refers(self, header: Header) -> bool:
+        """Whether a header names a channel of times."""
+        return is_time((header.text("reference channel name") or "").partition("/")[0].strip())
+
+    def _trigger_is_known(self) -> bool:
+        """Whether the head's channels say when they begin: all of them or none; 422 for some."""
+        if len(self.begin) > 1:
+            detail = "Some of the head's channels say the time of their first sample, some do not."
+            raise curve_fault(detail, "time-missing")
+        return self.begin != {False}
 
     def _reference(self, header: Header, count: int, named: str) -> FloatArray:
         wanted = (header.text("reference channel name") or "").partition("/")[0].strip().upper()

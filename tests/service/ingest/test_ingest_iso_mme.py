@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ingest_files import RECORDINGS, codes, half_sine, needs_recordings, one, outcome, read, refused, statuses, zipped
-from laboratory import ISO_CODES, SAMPLES, channel, channels, iso_mme, text
+from laboratory import FIRST_S, INTERVAL_S, ISO_CODES, SAMPLES, channel, channels, iso_mme, text
 
 from headimpact.filtering import PAPER
 from headimpact.preparation import prepare
@@ -326,6 +326,36 @@ def test_any_damage_to_a_channel_is_read_or_refused(damage, which):
         data[place : place + len(junk)] = junk
     damaged = {c: content.decode("latin-1") for c, content in (held | {code: bytes(data)}).items()}
     assert statuses(outcome(iso_mme(damaged, encoding="latin-1"))) <= {413, 415, 422}
+
+
+class TestWhichTimes:
+    """Of the times that a set gives, those that count."""
+
+    TIMES = "11TIRS000000TI00"
+
+    def timed(self, **changes: object) -> bytes:
+        times = [FIRST_S + n * INTERVAL_S / 2 for n in range(SAMPLES)]
+        held = channels(reference_channel="explicit", reference_channel_name=self.TIMES, **changes)
+        return iso_mme(held | {self.TIMES: channel(self.TIMES, "s", times)})
+
+    def test_the_channel_of_times_that_a_header_refers_to_counts_more_than_an_interval_beside_it(self):
+        assert one(self.timed()).recording.linear_acceleration.sample_rate_hz == 2000.0
+        told = one(self.timed(sampling_interval=None, time_of_first_sample=None)).recording
+        assert (told.linear_acceleration.sample_rate_hz, told.pre_trigger_ms) == (2000.0, 10.0)
+
+    def test_without_a_first_time_the_trigger_is_not_known(self):
+        recording = one(iso_mme(channels(time_of_first_sample=None))).recording
+        assert (recording.linear_acceleration.sample_rate_hz, recording.pre_trigger_ms) == (1000.0, None)
+
+    def test_a_first_time_that_only_some_channels_say_is_refused(self):
+        held = channels() | {AX: channel(AX, "g", half_sine(SAMPLES).tolist(), time_of_first_sample=None)}
+        assert codes(refused(iso_mme(held))) == [(None, "time-missing")]
+
+    def test_the_sender_may_give_the_rate_that_the_headers_do_not(self):
+        held = channels(sampling_interval=None)
+        assert codes(refused(iso_mme(held))) == [(None, "time-missing")]
+        recording = one(iso_mme(held), sample_rate_hz=1000.0).recording
+        assert (recording.linear_acceleration.sample_rate_hz, recording.pre_trigger_ms) == (1000.0, 10.0)
 
 
 class TestTogether:
