@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from datetime import datetime
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import from_json
@@ -19,6 +19,7 @@ from headimpact_service.ingest.impact_json import (
     Axes,
     Context,
     Filter,
+    Location,
     MountingBody,
     Plane,
     Strict,
@@ -41,6 +42,11 @@ def _json(value: Any) -> Any:  # noqa: ANN401 - validated after
         return value
 
 
+def _location(value: Any) -> Any:  # noqa: ANN401 - validated after
+    """Where the signals were measured; a team's column of this name says where it played."""
+    return value if value in get_args(Location) else None
+
+
 class Reading(Strict):
     """How an impact's samples are to be read, as its row says; each field as in the JSON of an impact."""
 
@@ -48,6 +54,7 @@ class Reading(Strict):
     filter: Annotated[Filter, BeforeValidator(_json)] | None = None
     constrained_plane: Plane | None = None
     pre_trigger_ms: float | None = Field(None, ge=0.0, le=60_000.0)
+    location: Annotated[Location | None, BeforeValidator(_location)] = None
     mounting: Annotated[MountingBody, BeforeValidator(_json)] | None = None
     sample_rate_hz: float | None = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
     fill_gaps: bool = False

@@ -109,7 +109,7 @@ ContextField = Literal[
     "age_years",
 ]
 ReadingField = Literal[
-    "axes", "filter", "constrained_plane", "pre_trigger_ms", "mounting", "sample_rate_hz", "fill_gaps"
+    "axes", "filter", "constrained_plane", "pre_trigger_ms", "location", "mounting", "sample_rate_hz", "fill_gaps"
 ]
 
 

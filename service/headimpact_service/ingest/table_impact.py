@@ -18,7 +18,7 @@ from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
-from headimpact_service.ingest.formula_cells import unguarded
+from headimpact_service.ingest.formula_cells import unguarded, unguarded_name
 from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass, mounting
 from headimpact_service.ingest.labels import (
@@ -140,7 +140,7 @@ class TableImpact:
             metadata=self._metadata(),
             notes=tuple(self.notes),
             unscorable=() if unscorable is None else (unscorable,),
-            needs_device_mounting=self.mapping.location == "sensor" and recording.mounting is None,
+            needs_device_mounting=self._location == "sensor" and recording.mounting is None,
         )
 
     def sent_name(self) -> str | None:
@@ -194,10 +194,18 @@ class TableImpact:
     def _mounting(self) -> Mounting | None:
         """The mounting that the row or the layout brings; None where none is needed, or the device's is."""
         if self.reading.mounting is not None:
+            if self.reading.location == "head_cg":
+                detail = "A mounting is for signals of the sensor: the row says that they are the head's."
+                raise label_fault(detail, "mounting-not-needed", parameter="location")
             return mounting(self.reading.mounting, "/mounting")
-        if self.mapping.location != "sensor" or self.mapping.mounting is None:
+        if self._location != "sensor" or self.mapping.mounting is None:
             return None
         return mounting(self.mapping.mounting, "/mounting")
+
+    @property
+    def _location(self) -> str | None:
+        """Where the signals were measured, as the row says or else the mapping."""
+        return self.reading.location or self.mapping.location
 
     def _tracks(self) -> list[Track]:
         """The rows of each signal: all of the impact's, unless these are parted by time base."""
@@ -403,7 +411,7 @@ class TableImpact:
         if column is None:
             return None
         text = self.labels.said(column)
-        return (unguarded(text) if self.plan.format == "csv" else text) or None
+        return (unguarded(text) if self.plan.format == "csv" else unguarded_name(text)) or None
 
     def _name(self, field: str, column: int | None) -> str | None:
         return checked_name(self._text(column), field)

@@ -40,6 +40,8 @@ _SYMBOLS = {
 }
 _SAMPLES = {signal: tuple(f"{symbol}{axis}{unit}" for axis in AXES) for signal, (symbol, unit) in _SYMBOLS.items()}
 _LABELS = ("id", "external_id", "athlete", "device", "occurred_at", *CONTEXT)
+NAMED = frozenset(_LABELS)
+"""Columns of what the sender called things."""
 _READING = ("axes", "filter", "constrained_plane", "pre_trigger_ms", "mounting", "fill_gaps", "unscorable")
 _TIMES = ("time_base", "sample_rate_hz", "t_ms")
 

@@ -8,7 +8,9 @@ from typing import Any
 
 from headimpact_service import deps
 from headimpact_service.answers import NDJSON, PARQUET
+from headimpact_service.ingest.formula_cells import guarded_name
 from headimpact_service.intake.exporting import (
+    NAMED,
     SAMPLE_COLUMNS,
     SAMPLE_FLAGS,
     SAMPLE_NUMBERS,
@@ -57,7 +59,12 @@ class _Samples(ParquetForm):
 
 
 def _cells(part: Part) -> list[Repeated]:
-    return [Repeated(part.column(name), part.rows) for name in SAMPLE_COLUMNS]
+    return [Repeated(_kept(part.column(name), name), part.rows) for name in SAMPLE_COLUMNS]
+
+
+def _kept(cell: Any, column: str) -> Any:  # noqa: ANN401 - an array, or the cell that all rows have
+    """A name that a reader would take for nothing is guarded; how samples are read is none of the sender's text."""
+    return guarded_name(cell) if isinstance(cell, str) and column in NAMED else cell
 
 
 async def with_samples(call: Call, rows: Sequence[Impact]) -> AsyncIterator[Sequence[Traced]]:

@@ -45,6 +45,16 @@ class TestReading:
         assert recording.linear_acceleration.sample_rate_hz == 1001.5
         assert recording.mounting.offset_m.tolist() == [0.07, 0.0, -0.01]
 
+    def test_a_row_may_say_where_its_signals_were_measured(self):
+        assert one(labelled(location="sensor")).needs_device_mounting
+        assert not one(labelled(location="head_cg")).needs_device_mounting
+        assert not one(labelled(location="Croke Park")).needs_device_mounting
+        mounted = one(labelled(location="sensor", mounting=json.dumps(MOUNTING)))
+        assert mounted.recording.mounting is not None
+        assert not mounted.needs_device_mounting
+        contradictory = labelled(location="head_cg", mounting=json.dumps(MOUNTING))
+        assert codes(refused(contradictory)) == [("location", "mounting-not-needed")]
+
     def test_a_filter_may_be_an_object(self):
         recording = one(labelled(filter='{"linear_acceleration": 300, "angular_velocity": "CFC180"}')).recording
         assert (recording.low_pass.linear_acceleration, recording.low_pass.angular_velocity) == (300, "CFC180")

@@ -105,6 +105,10 @@ def variants() -> dict[str, dict[str, Any]]:
         "level": "collegiate",
     }
     bodies["linear only"] |= {"external_id": "=1+1", "athlete": {"external_id": "-7"}}
+    bodies["named like nothing"] = impact_body(
+        "NA", scale=1.31, athlete={"external_id": "null"}, device={"serial": "-"}, context={"sport": "missing"}
+    )
+    bodies["quoted like nothing"] = impact_body("'nan", scale=1.32, athlete={"external_id": "."})
     bodies["rotation only"] |= {"external_id": "'=1+1", "athlete": {"external_id": "'quoted"}}
     bodies["linear only"]["context"] = {"session_id": "+s", "sport": "'@"}
     bodies["plain"]["device"] = {"serial": "mg-1"}
