@@ -14,6 +14,7 @@ from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import Preset, preset_named, recognise, spoken_of
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
+from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.table_impact import Plan, Samples, TableImpact
 from headimpact_service.ingest.windows import Window, windows
@@ -33,6 +34,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     layout = lay_out(plan.mapping, headings, plan.required)
     _require_read(layout, headings, options)
     _require_rate(layout, plan)
+    _require_no_other_rate(layout, plan, headings)
     if not (table.parted or _names_one_impact(options)):
         layout = layout.watching(headings)
     blocks = table.blocks(layout.numbers, layout.texts)
@@ -132,3 +134,30 @@ def _require_rate(layout: Layout, plan: Plan) -> None:
             parameter="sample_rate_hz",
         )
         raise Problem("unreadable-file", fault.detail, errors=[fault])
+
+
+_TIMES_OR_RATES = frozenset(
+    {
+        *("t", "time", "times", "timestamp", "timestamps", "tms", "ts", "timems", "times", "timesec", "tsec"),
+        *("fs", "rate", "samplerate", "samplingrate", "sampleratehz", "samplingratehz", "samplingfrequency"),
+        *("samplefrequency", "frequency", "freq", "hz", "dt", "samplinginterval", "sampleinterval"),
+    }
+)
+"""Names of times and rates, as :func:`compact` has them."""
+
+
+def _require_no_other_rate(layout: Layout, plan: Plan, headings: Headings) -> None:
+    """Refuse to take a device's usual rate where the file seems to say its own, in a way that is not read."""
+    usual = plan.mapping.sample_rate_hz is not None and "sample_rate_hz" not in plan.required
+    if not usual or plan.options.sample_rate_hz is not None or layout.is_timed or "sample_rate_hz" in layout.reading:
+        return
+    unread = set(range(len(headings.written))) - {*layout.numbers, *layout.texts}
+    for column in sorted(unread):
+        if compact(headings.written[column]) in _TIMES_OR_RATES:
+            raise layout_problem(
+                f"The column {headings.written[column]} seems to say times or a rate and is not read: name it in a "
+                f"mapping's time, with its unit, or give sample_rate_hz beside the file ({plan.preset} would take "
+                f"{plan.mapping.sample_rate_hz:g} Hz).",
+                code="rate-unclear",
+                parameter="sample_rate_hz",
+            )

@@ -195,3 +195,101 @@ def test_a_file_that_is_cut_off_is_refused():
         for length in (30, 127, 130, 200, len(data) - 9):
             assert refused(data[:length], preset=PRESET).status == 422
     assert "header" in refused(mat({"a": noise(1)})[:126] + b"XX" + b"\0" * 20).detail
+
+
+T_2KHZ = np.arange(100) / 2000.0
+SIGNALS = {
+    "linear_acceleration": {"unit": "g", "x": "ax", "y": "ay", "z": "az"},
+    "angular_velocity": {"unit": "rad/s", "x": "wx", "y": "wy", "z": "wz"},
+}
+
+
+class TestRates:
+    """What a file itself says of its rate goes before what its laboratory's files usually have."""
+
+    @pytest.mark.parametrize(
+        "beside",
+        [
+            {"t": T_2KHZ},
+            {"t": T_2KHZ[:, None] * 1000.0},
+            {"time": np.tile(T_2KHZ, (3, 1))},
+            {"fs": 2000.0},
+            {"Fs": np.full((3, 1), 2000.0)},
+            {"sampling_rate": 2000.0},
+        ],
+    )
+    def test_one_that_is_not_read_is_not_passed_over(self, beside: dict[str, Any]):
+        problem = refused(mat({"impacts": noise(3, 100)} | beside), preset=PRESET)
+        assert codes(problem) == [("sample_rate_hz", "rate-missing" if "t" in beside else "rate-unclear")]
+        found = records(mat({"impacts": noise(3, 100)} | beside), preset=PRESET, sample_rate_hz=2000.0)
+        assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {2000.0}
+
+    @pytest.mark.parametrize(
+        "beside",
+        [
+            {"time_ms": T_2KHZ * 1000.0},
+            {"time_s": np.tile(T_2KHZ, (3, 1))},
+            {"sample_rate_hz": 2000.0},
+            {"sample_rate_hz": np.full((1, 3), 2000.0)},
+        ],
+    )
+    def test_one_that_names_its_unit_is_read(self, beside: dict[str, Any]):
+        found = records(mat({"impacts": noise(3, 100)} | beside), preset=PRESET)
+        assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {2000.0}
+
+    @pytest.mark.parametrize("times", [TIMES_S, TIMES_S * 1000.0, np.tile(TIMES_S, (3, 1))])
+    def test_times_of_1_khz_are_seconds_or_milliseconds(self, times: np.ndarray):
+        found = records(mat({"impacts": noise(3, 100), "t": times}), preset=PRESET)
+        assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {1000.0}
+        assert {record.recording.pre_trigger_ms for record in found} == {10.0}
+
+    def test_a_struct_without_its_times_does_not_hide_its_rate(self):
+        [values] = noise(1, 100)
+        struct = structs({"lin_acc_CG": values[:, :3], "ang_vel": values[:, 3:], "fs": 2000.0})
+        assert codes(refused(mat({"impact": struct}), preset=PRESET)) == [("sample_rate_hz", "rate-unclear")]
+
+
+class TestOtherShapes:
+    """What people save who have no struct array."""
+
+    @pytest.mark.parametrize("kind", ["column", "row"])
+    def test_a_row_a_channel_is_one_impact(self, kind: Any):
+        [values] = noise(1, 100)
+        channels = dict(zip(("ax", "ay", "az", "wx", "wy", "wz"), values.T, strict=True))
+        mapping = Mapping.model_validate(SIGNALS | {"time": {"column": "t", "unit": "s"}})
+        [record] = records(mat({"t": TIMES_S} | channels, oned_as=kind), mapping=mapping)
+        np.testing.assert_array_equal(samples_of(record), values)
+        assert record.recording.pre_trigger_ms == 10.0
+
+    def test_arrays_of_one_impact_share_their_times(self):
+        [values] = noise(1, 100)
+        named = {
+            signal: columns | {axis: f"{name}_{axis}" for axis in "xyz"}
+            for (signal, columns), name in zip(SIGNALS.items(), ("acc", "gyr"), strict=True)
+        }
+        mapping = Mapping.model_validate(named | {"time": {"column": "t", "unit": "s"}})
+        [record] = records(mat({"acc": values[:, :3], "gyr": values[:, 3:], "t": TIMES_S}), mapping=mapping)
+        np.testing.assert_array_equal(samples_of(record), values)
+
+    def test_a_cell_holds_an_impact(self):
+        values = noise(3, 100)
+        cells = np.empty((1, 3), dtype=object)
+        for number, sent in enumerate(values):
+            cells[0, number] = sent[: 100 - number]
+        found = records(mat({"hits": cells}), preset=PRESET)
+        assert [samples_of(record).shape for record in found] == [(100, 6), (99, 6), (98, 6)]
+        np.testing.assert_array_equal(samples_of(found[1]), values[1, :99])
+
+    def test_a_cell_may_hold_a_struct(self):
+        values = noise(2, 100)
+        cells = np.empty((2, 1), dtype=object)
+        for number, sent in enumerate(values):
+            cells[number, 0] = {"t": TIMES_S[:, None], "lin_acc_CG": sent[:, :3], "ang_vel": sent[:, 3:]}
+        found = records(mat({"hits": cells}), preset=PRESET)
+        np.testing.assert_array_equal(np.stack([samples_of(record) for record in found]), values)
+
+    def test_a_struct_may_hold_the_arrays_of_all_impacts(self):
+        values = noise(3, 100)
+        session = {"lin_acc_CG": values[:, :, :3], "ang_vel": values[:, :, 3:], "t": TIMES_S}
+        found = records(mat({"session": session}), preset=PRESET)
+        np.testing.assert_array_equal(np.stack([samples_of(record) for record in found]), values)

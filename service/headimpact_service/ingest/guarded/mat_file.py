@@ -7,27 +7,28 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Iterator, Sequence
-from typing import Any, BinaryIO, TypeGuard
+from collections.abc import Iterator
+from typing import Any, BinaryIO
 
 import numpy as np
 from scipy.io import loadmat, savemat
 
-from headimpact_service.ingest.cells import number_text
-from headimpact_service.ingest.guarded.array_table import AXES, MAX_LENGTH, ROWS_AT_ONCE, ArrayTable, Fact, Samples
-from headimpact_service.ingest.guarded.contents import (
-    Content,
-    NamedTable,
-    checked_headings,
-    checked_text,
-    unreadable,
+from headimpact_service.ingest.guarded.array_table import AXES, ArrayTable, Fact, Samples
+from headimpact_service.ingest.guarded.contents import Content, NamedTable, unreadable
+from headimpact_service.ingest.guarded.mat_struct import (
+    MAX_WIDTH,
+    TIMES,
+    AnyArray,
+    StructTable,
+    by_samples,
+    called_by,
+    holds_samples,
+    text_of,
 )
-from headimpact_service.ingest.table import Columns, FloatArray
+from headimpact_service.ingest.table import FloatArray
 
 MAX_INFLATED = 32 * 1024 * 1024
 MAX_ELEMENTS = 10_000
-MAX_FIELDS = 100
-MAX_WIDTH = 64
 MAX_DEPTH = 8
 """Of structs within structs."""
 ALONE = "array"
@@ -36,12 +37,6 @@ _HEADER = 128
 _COMPRESSED = 15
 _BLOCK = 64 * 1024
 
-AnyArray = np.ndarray[Any, np.dtype[Any]]
-_TIME = "t"
-_STEPS = (("t (s)", 1e-3), ("t (ms)", 1.0))
-"""What a device of 1 kHz calls its times, by the step between two of them."""
-_TOLERANCE = 0.15
-
 
 def contents(stream: BinaryIO) -> Iterator[Content]:
     """The impacts of a file's struct array, or else those of its arrays of samples."""
@@ -49,12 +44,37 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
     stream.seek(0)
     document: dict[str, Any] = loadmat(stream)  # type: ignore[arg-type] # the stubs know of paths only
     variables = {name: value for name, value in document.items() if not name.startswith("__")}
-    structs = [value for value in variables.values() if isinstance(value, np.ndarray) and value.dtype.names]
+    structs = [value for value in variables.values() if _is_struct(value)]
+    cells = {name: value for name, value in variables.items() if _is_cells(value)}
     if structs:
         for struct in structs:
-            yield NamedTable(None, StructTable([_flat(element) for element in _elements(struct)]))
-        return
-    yield NamedTable(None, _arrays(variables))
+            yield NamedTable(None, _table_of([_flat(element) for element in _elements(struct)]))
+    elif cells:
+        for name, value in cells.items():
+            yield NamedTable(None, _table_of([_of_cell(name, cell) for cell in value.reshape(-1)]))
+    else:
+        yield NamedTable(None, _arrays(variables))
+
+
+def _table_of(impacts: list[dict[str, Any]]) -> ArrayTable | StructTable:
+    """The impacts of a struct array; a single struct may hold the arrays of many."""
+    if len(impacts) == 1 and _numeric(impacts[0], 3):
+        return _arrays(impacts[0])
+    return StructTable(impacts)
+
+
+def _is_cells(value: Any) -> bool:  # noqa: ANN401 - whatever a file holds
+    """Whether a variable is a cell array with an impact in each cell: a struct, or samples x components."""
+    if not isinstance(value, np.ndarray) or value.dtype != object or not value.size:
+        return False
+    cells = value.reshape(-1)
+    return all(_is_struct(cell) and cell.size == 1 for cell in cells) or all(
+        holds_samples(cell) and by_samples(cell).shape[1] >= len(AXES) for cell in cells
+    )
+
+
+def _of_cell(name: str, cell: AnyArray) -> dict[str, Any]:
+    return _flat(cell.reshape(-1)[0]) if _is_struct(cell) else {name: cell, ALONE: cell}
 
 
 def warm_up() -> None:
@@ -106,21 +126,48 @@ def _inflated(stream: BinaryIO, size: int, most: int) -> int:
 
 
 def _arrays(variables: dict[str, Any]) -> ArrayTable:
-    """Every array impacts x samples x components, or else samples x components.
+    """Every array impacts x samples x components, or else samples x components, or else a row of samples a channel.
 
     Of one alone the columns are also called array_1, array_2 and so on.
     """
+    numbers = _numeric(variables, 2)
     solid = _numeric(variables, 3) or {name: value[np.newaxis] for name, value in _of_one_impact(variables).items()}
     if not solid:
-        raise unreadable("The MATLAB file holds neither a struct array nor an array impacts x samples x components.")
+        solid = {name: value.reshape(1, -1, 1) for name, value in numbers.items() if _is_row(value)}
+    if not solid:
+        raise unreadable(
+            "The MATLAB file holds neither a struct array nor an array impacts x samples x components, nor rows of "
+            "samples."
+        )
     if any(value.shape[2] > MAX_WIDTH for value in solid.values()):
         raise unreadable(f"The last dimension of an array of samples is its 1 to {MAX_WIDTH} components.")
-    impacts = next(iter(solid.values())).shape[0]
+    impacts, length = next(iter(solid.values())).shape[:2]
     samples = [_samples(name, value) for name, value in solid.items()]
     if len(solid) == 1 and ALONE not in solid:
         samples.append(_samples(ALONE, next(iter(solid.values()))))
-    facts = [Fact(name, None, texts) for name, value in variables.items() if (texts := _texts_of(value, impacts))]
-    return ArrayTable(samples, facts, {})
+    beside = {name: value for name, value in numbers.items() if name not in solid}
+    fitted = ((name, _shared(name, value, impacts, length)) for name, value in beside.items())
+    shared = {name: found for name, found in fitted if found is not None}
+    clocks = [_samples(called, found) for name, found in shared.items() for called in called_by(name, found)]
+    facts = [
+        Fact(name, None, texts)
+        for name, value in variables.items()
+        if name not in shared and (texts := _texts_of(value, impacts))
+    ]
+    return ArrayTable([*clocks, *samples], facts, {})
+
+
+def _is_row(value: AnyArray) -> bool:
+    return 1 in value.shape and value.size > 1
+
+
+def _shared(name: str, value: AnyArray, impacts: int, length: int) -> AnyArray | None:
+    """A channel beside the samples: a value for each sample of each impact, or for each sample of all of them."""
+    if value.shape == (impacts, length) and impacts > 1:
+        return value[:, :, np.newaxis]
+    if not _is_row(value) or value.size != length or (value.size == impacts and name.lower() not in TIMES):
+        return None
+    return np.broadcast_to(value.reshape(1, -1, 1), (impacts, length, 1))
 
 
 def _elements(struct: AnyArray) -> AnyArray:
@@ -184,106 +231,7 @@ def _samples(name: str, value: AnyArray) -> Samples:
 
 
 def _texts_of(value: Any, impacts: int) -> list[str]:  # noqa: ANN401 - whatever a file holds
-    """The texts or numbers of a variable that has one for each impact; none where it has not."""
-    if not isinstance(value, np.ndarray) or value.size != impacts or max(value.shape, default=0) != impacts:
+    """The texts or numbers of a variable that has one for each impact, or for all; none where it has not."""
+    if not isinstance(value, np.ndarray) or value.size not in {1, impacts} or max(value.shape, default=0) != value.size:
         return []
-    return [_text(cell) for cell in value.reshape(-1).tolist()]
-
-
-def _text(cell: Any) -> str:  # noqa: ANN401 - whatever a file holds
-    if isinstance(cell, np.ndarray):
-        return _text(cell.reshape(-1)[0].item()) if cell.size == 1 and cell.dtype.kind in "USfiu" else ""
-    if isinstance(cell, str):
-        return checked_text(cell)
-    return number_text(float(cell)) if isinstance(cell, int | float) else ""
-
-
-class StructTable:
-    """A struct array: each element is an impact, each field a column of samples, three of them, or a fact."""
-
-    parted = True
-    units: dict[int, str] = {}  # noqa: RUF012 - a MATLAB file says none
-
-    def __init__(self, impacts: Sequence[dict[str, Any]]) -> None:
-        """Look at every field once."""
-        self._impacts = impacts
-        names = list(dict.fromkeys(name for impact in impacts for name in impact))
-        if len(names) > MAX_FIELDS:
-            raise unreadable(f"A struct may have at most {MAX_FIELDS} fields.")
-        self._columns: list[tuple[str, int | None]] = []
-        headings: list[str] = []
-        for name in names:
-            for heading, part in self._headings_of(name):
-                headings.append(heading)
-                self._columns.append((name, part))
-        self.headings = checked_headings(headings)
-
-    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
-        """Some impacts at a time."""
-        held: list[tuple[dict[int, FloatArray], dict[int, str], int]] = []
-        for impact in self._impacts:
-            samples = {place: self._column(impact, place) for place in numbers}
-            length = min(max((values.size for values in samples.values()), default=0), MAX_LENGTH)
-            held.append((samples, {place: _text(impact.get(self._columns[place][0])) for place in texts}, length))
-            if sum(rows for _, _, rows in held) >= ROWS_AT_ONCE:
-                yield _joined(held, numbers, texts)
-                held = []
-        if held:
-            yield _joined(held, numbers, texts)
-
-    def _headings_of(self, name: str) -> list[tuple[str, int | None]]:
-        """A field's headings: of three components one each, of times also that with the unit that makes 1 kHz."""
-        cells = [value for impact in self._impacts if _holds_samples(value := impact.get(name))]
-        if cells and all(_by_samples(value).shape[1] == 3 for value in cells):
-            return [(f"{name}_{axis}", part) for part, axis in enumerate(AXES)]
-        if not cells or any(_by_samples(value).shape[1] != 1 for value in cells):
-            return [(name, None)]
-        called = [heading for heading, step in _STEPS if name == _TIME and all(_steps_by(v, step) for v in cells)]
-        return [(heading, 0) for heading in (name, *called)]
-
-    def _column(self, impact: dict[str, Any], place: int) -> FloatArray:
-        name, part = self._columns[place]
-        value: Any = impact.get(name)
-        if part is not None and not _holds_samples(value) and _is_numeric(value):
-            return np.empty(0)  # this impact has no such samples
-        if part is None or not _is_numeric(value):
-            raise unreadable(f"The field {name} of the struct holds no column of numbers.")
-        return _by_samples(value)[:, part].astype(np.float64)
-
-
-def _is_numeric(value: Any) -> TypeGuard[AnyArray]:  # noqa: ANN401 - whatever a file holds
-    return isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.ndim == 2
-
-
-def _holds_samples(value: Any) -> TypeGuard[AnyArray]:  # noqa: ANN401 - whatever a file holds
-    """Neither nothing nor a lone number, as which MATLAB writes what is not there."""
-    return _is_numeric(value) and value.size > 1
-
-
-def _by_samples(value: AnyArray) -> AnyArray:
-    """Samples x components, however the field lies."""
-    lies_down = value.shape[0] in (1, 3) and value.shape[1] > 3
-    return value.T if lies_down else value
-
-
-def _steps_by(value: AnyArray, step: float) -> bool:
-    steps = np.diff(_by_samples(value)[:, 0].astype(np.float64))
-    return steps.size > 0 and bool(np.all(np.abs(steps / step - 1.0) <= _TOLERANCE))
-
-
-def _joined(
-    held: list[tuple[dict[int, FloatArray], dict[int, str], int]], numbers: Sequence[int], texts: Sequence[int]
-) -> Columns:
-    """Impacts end to end, the shorter columns of each ending in NaN."""
-    lengths = [length for _, _, length in held]
-    columns: dict[int, FloatArray] = {}
-    for place in numbers:
-        parts = [_of_length(samples[place], length) for samples, _, length in held]
-        columns[place] = np.concatenate(parts)
-    return Columns(sum(lengths), columns, {place: [cells[place] for _, cells, _ in held] for place in texts}, lengths)
-
-
-def _of_length(values: FloatArray, length: int) -> FloatArray:
-    if values.size >= length:
-        return values[:length]
-    return np.concatenate((values, np.full(length - values.size, np.nan)))
+    return [text_of(cell) for cell in value.reshape(-1).tolist()]
