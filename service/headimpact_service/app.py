@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import cache
@@ -41,8 +42,10 @@ from headimpact_service.routes.facts import Facts
 from headimpact_service.routes.scorer import Scorer
 from headimpact_service.settings import Settings
 from headimpact_service.store.database import Database
+from headimpact_service.store.unavailable import reason_of
 
 # In the order of the documentation; the first are matched first, so the busy ones lead.
+_log = logging.getLogger(__name__)
 _MODULES = (
     scoring,
     impacts,
@@ -103,6 +106,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 async def _problem(_: Request, problem: Exception) -> Response:
     assert isinstance(problem, Problem)
+    if problem.slug == "unavailable" and problem.__cause__ is not None:
+        _log.warning(problem.slug, extra={"cause": reason_of(problem.__cause__)})
     return problem_answer(problem)
 
 

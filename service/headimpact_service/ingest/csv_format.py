@@ -67,12 +67,14 @@ class CsvTable:
         self._quoted = text.quoted
         self._line = 0
         self._begun, self._empty_rows = False, 0
+        self._ends: list[int] = []  # the line that each row of a block ends in
         heading, has_units = self._find_headings(skip_rows)
         self._delimiter = delimiter_of(heading)
         self._decimal_mark = ""
         self._decimal_commas = text.has_decimal_commas(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
         self.headings: tuple[str, ...] = tuple(self._rows(reader, 1)[0])
+        self._repeated = [heading.strip() for heading in self.headings]
         self.units: Mapping[int, str] = self._read_units(reader) if has_units else {}
         self._simply_quoted = _simply_quoted(self._delimiter)
         if len(self.headings) > MAX_COLUMNS:
@@ -147,20 +149,26 @@ class CsvTable:
 
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
         """A block cell by cell, saying what is wrong with it."""
-        full = [fitted for row in rows for fitted in self._fitted(row)]
+        full = [fitted for place, row in enumerate(rows) for fitted in self._fitted(row, place)]
         samples = np.array([[self._number(row[index]) for index in numbers] for row in full], dtype=np.float64)
         return samples.reshape(len(full), len(numbers)), [[row[index] for row in full] for index in texts]
 
     def _rows(self, reader: Reader, count: int) -> list[list[str]]:
+        rows: list[list[str]] = []
+        self._ends = []
         try:
-            return list(islice(reader, count))
+            for row in islice(reader, count):
+                rows.append(row)
+                self._ends.append(self._line + reader.line_num)
         except csv.Error:
             raise unreadable(f"The quotes around line {self._line + reader.line_num} do not match.") from None
+        return rows
 
-    def _fitted(self, row: list[str]) -> Iterator[list[str]]:
+    def _fitted(self, row: list[str], place: int) -> Iterator[list[str]]:
         """A row as long as the headings, behind the rows of empty cells that it ends; those at the table's end go.
 
-        Spreadsheets add empty cells at the end, and rows of nothing else; between samples they are lost samples.
+        Spreadsheets add empty cells at the end, and rows of nothing else; between samples they are lost samples. Files
+        that were joined have their headings again.
         """
         width = len(self.headings)
         if not any(cell.strip() for cell in row):
@@ -170,8 +178,10 @@ class CsvTable:
             return
         if len(row) < width or any(cell.strip() for cell in row[width:]):
             raise unreadable(
-                f"A row from line {self._line + 1} on has {len(row)} cells where the headings have {width}."
+                f"The row in line {self._ends[place]} has {len(row)} cells where the headings have {width}."
             )
+        if [cell.strip() for cell in row[:width]] == self._repeated:
+            return
         yield from ([""] * width for _ in range(self._empty_rows))
         self._begun, self._empty_rows = True, 0
         yield row[:width]

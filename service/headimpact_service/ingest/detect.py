@@ -10,7 +10,7 @@ from headimpact_service.ingest.text_facts import UTF_16
 
 READ = (
     "CSV (also of DTS), JSON, NDJSON, Parquet, Arrow IPC, MATLAB (-v7), xlsx, npz, "
-    "and ISO-MME and NHTSA crash tests (zip)"
+    "and folders as zip: ISO-MME and NHTSA crash tests, CSV files"
 )
 
 

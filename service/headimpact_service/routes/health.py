@@ -39,4 +39,5 @@ async def read_readiness(call: Call) -> Response:
     """The database answers and has this version's schema; 503 otherwise."""
     database: Database = call.request.app.state.database
     await run_sync(database.check)
-    return answer({"status": "ok", "warnings": await run_sync(database.warnings)})
+    warnings = await run_sync(database.warnings) + await run_sync(call.request.app.state.uploads.warnings)
+    return answer({"status": "ok", "warnings": warnings})

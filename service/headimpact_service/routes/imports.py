@@ -91,7 +91,7 @@ class PresetList(BaseModel):
     problems=("invalid-parameter", "unreadable-file", "import-too-large", "idempotency-conflict"),
 )
 async def import_file(call: Call) -> Response:
-    """CSV (also of DTS), JSON, NDJSON, Parquet, Arrow IPC, MATLAB (-v7), xlsx, npz, zips of ISO-MME and NHTSA tests.
+    """CSV (also of DTS), JSON, NDJSON, Parquet, Arrow IPC, MATLAB (-v7), xlsx, npz; zips of ISO-MME, NHTSA or CSV.
 
     Their content tells them apart; the columns of each are described in docs/formats.md.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -12,7 +13,7 @@ from sqlalchemy import Connection, Engine, NullPool, create_engine
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, SQLAlchemyError
 
-from headimpact_service.store import migrate, postgresql, sqlite
+from headimpact_service.store import disk, migrate, postgresql, sqlite
 from headimpact_service.store.access import Access, DatabaseUrlError
 from headimpact_service.store.unavailable import is_out_of_reach, unavailable
 from headimpact_service.store.writer import Writer
@@ -87,6 +88,8 @@ class Database:
         """What an operator should know about this database's engine, as sentences; empty if nothing."""
         with self.read() as conn:
             found: list[str] = self._backend.warnings(conn)
+        if self.is_file and self.url.database:
+            found += disk.warnings(Path(self.url.database).resolve().parent, "the database")
         return found
 
     def checkpoint(self) -> None:

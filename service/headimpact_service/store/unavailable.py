@@ -22,3 +22,10 @@ def is_out_of_reach(error: BaseException) -> bool:
     """
     lost = isinstance(error, DBAPIError) and error.connection_invalidated
     return lost or isinstance(error, OperationalError | PoolTimeout) or type(error) is DatabaseError
+
+
+def reason_of(error: BaseException) -> str:
+    """Why it cannot, in one line, as the database's driver or the system says it."""
+    said = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
+    text = said.strerror if isinstance(said, OSError) and said.strerror else str(said)
+    return f"{type(said).__name__}: {text.partition(chr(10))[0]}"

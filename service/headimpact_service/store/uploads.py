@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -13,6 +14,9 @@ from typing import BinaryIO
 from uuid import uuid4
 
 from sqlalchemy.engine import URL
+
+from headimpact_service.store import disk
+from headimpact_service.store.unavailable import unavailable
 
 PARTIAL = ".part"
 BLOCK = 1024 * 1024
@@ -32,6 +36,10 @@ class Uploads:
     def __init__(self, folder: Path) -> None:
         """Nothing is made before the first file comes."""
         self.folder = folder
+
+    def warnings(self) -> list[str]:
+        """What an operator should know of the folder, as sentences."""
+        return disk.warnings(self.folder, "uploads")
 
     def receive(self, in_memory: int) -> Incoming:
         """A file that is about to arrive; it goes to the folder once it is longer than `in_memory` bytes."""
@@ -82,9 +90,10 @@ class Incoming:
         """Append bytes."""
         self.length += len(data)
         self._hashed = None
-        if self.is_large and self._path is None:
-            self._move_to_folder()
-        return self._file.write(data)
+        with _writing():
+            if self.is_large and self._path is None:
+                self._move_to_folder()
+            return self._file.write(data)
 
     def seek(self, offset: int, whence: int = 0) -> int:
         """As of any file."""
@@ -111,19 +120,21 @@ class Incoming:
 
     def keep(self, name: str) -> None:
         """Bring it to disk under a name: when this returns, it survives the power."""
-        if self._path is None:
-            self._move_to_folder()
-        assert self._path is not None
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
-        self._path.rename(self._folder / name)
-        self._path = None
-        _sync_folder(self._folder)
+        with _writing():
+            if self._path is None:
+                self._move_to_folder()
+            assert self._path is not None
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
+            self._path.rename(self._folder / name)
+            self._path = None
+            _sync_folder(self._folder)
 
     def close(self) -> None:
         """Let go of it."""
-        self._file.close()
+        with suppress(OSError):  # what was still to be written, to a full disk
+            self._file.close()
         if self._path is not None:
             self._path.unlink(missing_ok=True)
             self._path = None
@@ -135,6 +146,15 @@ class Incoming:
         self._file.close()
         self._file = os.fdopen(os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_EXCL, PRIVATE), "w+b")
         self._file.write(before)
+
+
+@contextmanager
+def _writing() -> Iterator[None]:
+    """503 where the folder is full, or is none."""
+    try:
+        yield
+    except OSError as error:
+        raise unavailable("Uploads cannot be kept now: their folder is full or cannot be written to.") from error
 
 
 def _written(path: Path) -> float:

@@ -74,9 +74,24 @@ class TestTop:
     def test_rows_below_the_headings_are_counted_from_there(self):
         lines = csv_text().splitlines()
         lines[5] = lines[5] + ",1"
-        assert "from line 2 on" in refused("\n".join(lines)).detail
+        assert "in line 6 has 8 cells" in refused("\n".join(lines)).detail
         above = ["Device: X1", "", lines[0], UNITS]
-        assert "from line 5 on" in refused("\n".join([*above, *lines[1:]])).detail
+        assert "in line 9 has 8 cells" in refused("\n".join([*above, *lines[1:]])).detail
+
+    def test_a_row_s_line_is_that_of_the_file_though_cells_go_on_over_lines(self):
+        lines = [f'{line},"a{chr(10)}b"' for line in csv_text().splitlines()]
+        lines[0] = lines[0].replace('"a\nb"', "note")
+        lines[5] += ",1"
+        assert "in line 11 has 9 cells" in refused("\n".join(lines)).detail
+
+    @pytest.mark.parametrize("key", ["", "impact_id,"])
+    def test_headings_that_stand_again_where_files_were_joined_are_passed_over(self, key):
+        cell = "1," if key else ""
+        heading, *lines = [
+            f"{key if not number else cell}{line}" for number, line in enumerate(csv_text().splitlines())
+        ]
+        record = one("\n".join([heading, *lines[:20], heading, *lines[20:]]))
+        assert np.array_equal(samples_of(record), samples_of(one(csv_text())))
 
     def test_a_first_row_of_cells_that_hold_nothing_is_no_heading(self):
         lines = csv_text().splitlines()

@@ -6,9 +6,13 @@ import gzip
 
 import numpy as np
 import pytest
-from ingest_files import body, csv_text, encoded, one, refused, six_axis, zipped
+from ingest_files import body, csv_text, encoded, one, outcome, read, refused, six_axis, statuses, zipped
+from making import prevent
 
+from headimpact_service.errors import Problem
+from headimpact_service.ingest import upload
 from headimpact_service.ingest.detect import Kind, detect
+from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.stamps import nominal_rate
 from headimpact_service.ingest.upload import READERS
 
@@ -111,3 +115,44 @@ def test_a_rate_that_is_no_whole_number_stays_as_the_stamps_have_it():
 def test_stamps_that_are_not_uniform_say_no_rate(stamps: list[float]):
     with np.errstate(all="ignore"):
         assert nominal_rate(np.array(stamps)) is None
+
+
+class TestFolderOfTables:
+    """Files of a device that writes one an impact, in a zip."""
+
+    def test_each_is_read_as_if_it_came_alone(self) -> None:
+        data = zipped(
+            {
+                "session/b.csv": csv_text(2.0 * six_axis()),
+                "session/a.csv": csv_text(),
+                "session/README.txt": "What this is.",
+                "__MACOSX/session/._a.csv": b"\0\5\x16\7",
+            }
+        )
+        found = read(data, athlete="p-1")
+        assert [item.metadata["file"] for item in found] == ["a.csv", "b.csv"]
+        assert [item.recording.linear_acceleration.values.max() for item in found] == [
+            six_axis()[:, :3].max(),
+            2.0 * six_axis()[:, :3].max(),
+        ]
+        assert {item.athlete_external_id for item in found} == {"p-1"}
+
+    def test_a_device_s_file_name_tells_what_it_tells(self) -> None:
+        made = prevent()
+        [alone] = read(made.data, filename=made.filename)
+        [in_zip] = read(zipped({made.filename: made.data}))
+        assert alone.device_serial is not None
+        assert (in_zip.device_serial, in_zip.occurred_at) == (alone.device_serial, alone.occurred_at)
+
+    def test_one_that_cannot_be_read_is_refused_alone_and_by_name(self) -> None:
+        broken = csv_text().replace("0.005,", "0.005,7,", 1)
+        bad, good = read(zipped({"a.csv": broken, "b.csv": csv_text()}))
+        assert isinstance(bad, Problem)
+        assert bad.detail.startswith("a.csv: The row in line 7 has 8 cells")
+        assert isinstance(good, ImpactRecord)
+
+    def test_the_bounds_are_those_of_one_upload(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        data = zipped({f"{number}.csv": csv_text() for number in range(3)})
+        assert statuses(outcome(data, max_impacts=2)) == {413}
+        monkeypatch.setattr(upload, "MAX_TABLE", 100)
+        assert refused(data).slug == "import-too-large"

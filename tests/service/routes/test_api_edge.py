@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 from sending import Api
 
 from headimpact_service.errors import PROBLEMS
 from headimpact_service.pages.docs import ASSETS
+from headimpact_service.store.uploads import Uploads
 
 
 class TestRequestId:
@@ -43,6 +45,20 @@ class TestHealth:
         answer = api.get("/readyz")
         assert answer.status_code == 200
         assert any("fsync" in warning for warning in answer.json()["warnings"])
+
+    def test_a_folder_of_uploads_that_is_none_is_a_warning_503_and_a_line_in_the_log(
+        self, api: Api, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        (tmp_path / "file").touch()
+        api.app.state.uploads = Uploads(tmp_path / "file" / "uploads")
+        assert "The folder of uploads cannot be used: Not a directory." in api.get("/readyz").json()["warnings"]
+        answer = api.post(
+            "/v1/imports", content=b"t_s,ax_g\n", headers={"Content-Type": "text/csv", "Prefer": "respond-async"}
+        )
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/unavailable")
+        assert int(answer.headers["retry-after"]) > 0
+        [line] = [record for record in caplog.records if record.message == "unavailable"]
+        assert line.__dict__["cause"] == "NotADirectoryError: Not a directory"
 
 
 class TestPages:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
+from headimpact_service.errors import Problem
+from headimpact_service.store import disk
+from headimpact_service.store.unavailable import reason_of
 from headimpact_service.store.uploads import Uploads
 
 
@@ -55,3 +59,37 @@ def test_what_lies_there_is_named_and_told_by_its_age(uploads: Uploads) -> None:
     uploads.remove("job_1")
     uploads.remove("job_1")
     assert uploads.names() == {"job_2"}
+
+
+class TestFull:
+    """A folder that cannot be written to, or hardly."""
+
+    def test_a_folder_that_cannot_be_made_is_said_and_keeps_nothing(self, tmp_path: Path) -> None:
+        (tmp_path / "file").touch()
+        uploads = Uploads(tmp_path / "file" / "uploads")
+        assert uploads.warnings() == ["The folder of uploads cannot be used: Not a directory."]
+        with uploads.receive(2) as incoming, pytest.raises(Problem) as raised:
+            incoming.write(b"0123456789")
+        assert (raised.value.slug, raised.value.headers["Retry-After"]) == ("unavailable", "2")
+        assert reason_of(raised.value.__cause__) == "NotADirectoryError: Not a directory"
+
+    @pytest.mark.parametrize("length", [5, 20])
+    def test_a_disk_that_is_full_is_said_and_leaves_nothing(
+        self, uploads: Uploads, length: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def full(handle: int) -> None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        monkeypatch.setattr(os, "fsync", full)
+        with uploads.receive(10) as incoming:
+            incoming.write(b"x" * length)
+            with pytest.raises(Problem) as raised:
+                incoming.keep("job_1")
+        assert raised.value.slug == "unavailable"
+        assert uploads.names() == set()
+
+    def test_little_room_is_warned_of(self, uploads: Uploads, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert uploads.warnings() == []
+        monkeypatch.setattr(disk, "LOW", 1 << 62)
+        [warning] = uploads.warnings()
+        assert warning.startswith("The disk of uploads has ")
