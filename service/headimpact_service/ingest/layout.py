@@ -126,7 +126,7 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
     """
     signals: dict[SignalName, SignalLayout] = {}
     for name in SIGNALS:
-        laid = _signal(name, mapping, headings, name in required)
+        laid = _signal(name, mapping, headings, required)
         if laid is not None:
             signals[name] = laid
     if not signals:
@@ -153,12 +153,12 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
     )
 
 
-def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: bool) -> SignalLayout | None:
+def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: frozenset[str]) -> SignalLayout | None:
     columns = mapping.columns_of(name)
     if columns is None:
         return None
     components = {axis: _component(getattr(columns, axis), headings) for axis in AXES}
-    if not required and all(component is None for component in components.values()):
+    if name not in required and all(component is None for component in components.values()):
         return None
     needed = required_axes(name, mapping.constrained_plane)
     for axis in needed:
@@ -170,8 +170,8 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: bo
     return SignalLayout(
         unit=_unit(name, columns, _units_beside(name, (x, y, z), headings)),
         components=(x, y, z),
-        clock=_own_clock(name, columns, headings, first, required=required),
-        resultant=None if columns.resultant is None else headings.find(columns.resultant),
+        clock=_own_clock(name, columns, headings, first, required=name in required),
+        resultant=_resultant(name, columns, headings, required=f"{name}.resultant" in required),
         sample_rate_hz=columns.sample_rate_hz,
         full_scale=columns.range,
     )
@@ -200,6 +200,13 @@ def _own_clock(
     if required and columns.time:
         raise _missing(f"The column of the times of {name} was not found.", f"/{name}/time")
     return None
+
+
+def _resultant(name: SignalName, columns: SignalColumns, headings: Headings, *, required: bool) -> int | None:
+    column = None if columns.resultant is None else headings.find(columns.resultant)
+    if column is None and required:
+        raise _missing(f"The column of the resultant of {name} was not found.", f"/{name}/resultant")
+    return column
 
 
 def _units_beside(name: SignalName, components: Sequence[Component], headings: Headings) -> set[str]:

@@ -262,7 +262,7 @@ class TableImpact:
         if signal.clock is not None or signal.sample_rate_hz is not None or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         rate = self._said_rate(signal, clock, reading, rows)
-        if clock is None:
+        if clock is None or (rate is not None and self._stands_still(clock, rows)):
             return self._counted(Track(name, rows, rate or self.mapping.sample_rate_hz, None, 1.0))
         return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
 
@@ -276,7 +276,7 @@ class TableImpact:
         if said is None and signal.sample_rate_hz is not None and signal.clock is None:
             return signal.sample_rate_hz
         rate = said or signal.sample_rate_hz or asked
-        if rate is None or clock is None:
+        if rate is None or clock is None or self._stands_still(clock, rows):
             return rate
         stamps = self._stamps(clock.column, rows) * clock.milliseconds
         if not follows(stamps[np.isfinite(stamps)], rate):
@@ -288,6 +288,11 @@ class TableImpact:
                 parameter="sample_rate_hz",
             )
         return rate
+
+    def _stands_still(self, clock: Clock, rows: Rows) -> bool:
+        """Whether a column of times says when the impact was, and not its samples."""
+        stamps = self._stamps(clock.column, rows)
+        return stamps.size > 1 and bool((stamps == stamps[0]).all())
 
     def _counted(self, track: Track) -> Track:
         """A track of a rate, on stamps where the file's own numbers leave out samples."""

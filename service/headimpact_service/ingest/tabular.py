@@ -122,6 +122,8 @@ def _names_columns(mapping: Mapping) -> Iterator[str]:
         if value is None or (hasattr(value, "unit") and not (value.x or value.y or value.z)):
             continue
         yield name
+        if hasattr(value, "resultant") and value.resultant is not None:
+            yield f"{name}.resultant"
 
 
 def _require_rate(layout: Layout, plan: Plan) -> None:

@@ -12,6 +12,8 @@ _RFC3339 = re.compile(
 )
 _ZONE = re.compile(r"[A-Za-z0-9_+-]+(/[A-Za-z0-9_+-]+){0,2}")
 
+_OF_THE_HOST = frozenset({"localtime", "posixrules", "factory"})
+"""Files beside the zones that are none: what they say depends on the machine."""
 FORM = "A time is written as RFC 3339 does, 2026-11-20T19:04:05.123Z"
 
 
@@ -66,7 +68,7 @@ def _zone(name: str) -> ZoneInfo:
         code="unknown-zone",
         field="time_zone",
     )
-    if len(name) > 64 or _ZONE.fullmatch(name) is None:
+    if len(name) > 64 or _ZONE.fullmatch(name) is None or name.lower() in _OF_THE_HOST:
         raise unknown
     try:
         return ZoneInfo(name)

@@ -642,3 +642,9 @@ def test_rates_of_turns_by_their_names_are_not_passed_over(heading):
 def test_other_columns_in_g_beside_a_whole_signal_are_none_of_it():
     record = one(csv_text(np.hstack([six_axis(), six_axis()[:, :3]]), heading=f"{GENERIC},neck_x_g,neck_y_g,neck_z_g"))
     assert record.recording.linear_acceleration.values[:, 0].max() == six_axis()[:, 0].max()
+
+
+def test_a_resultant_that_a_mapping_names_must_be_there():
+    columns = {"unit": "g", "x": "ax_g", "y": "ay_g", "z": "az_g", "resultant": "a_mag"}
+    named = Mapping.model_validate({"linear_acceleration": columns, "time": {"column": "t_s", "unit": "s"}})
+    assert codes(refused(csv_text(), mapping=named)) == [("/linear_acceleration/resultant", "column-missing")]

@@ -13,6 +13,7 @@ import pytest
 from binary_files import COLUMNS, arrow, nested, noise, parquet, wide
 from ingest_files import body, codes, one, read, refused
 
+from headimpact.preparation import prepare
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
@@ -253,3 +254,28 @@ def test_a_file_that_is_cut_off_is_refused_or_gives_its_first_impacts(write: Cal
         problem = refused(data[:length])
         assert problem.slug == "unreadable-file"
         assert problem.status == 422
+
+
+@every_writer
+@pytest.mark.parametrize(
+    "times",
+    [
+        *(pa.array(np.arange(40) * step, pa.timestamp(unit)) for unit, step in (("ns", 500_000), ("us", 500))),
+        pa.array(1_800_000_000_000_000_000 + np.arange(40) * 500_000, pa.timestamp("ns", "UTC")),
+        *(pa.array(np.arange(40) * step, pa.duration(unit)) for unit, step in (("ns", 500_000), ("us", 500))),
+    ],
+    ids=lambda times: str(times.type),
+)
+def test_times_say_their_unit_by_their_type(write: Callable[[pa.Table], bytes], times: pa.Array):
+    [values] = noise(1)
+    columns = {"timestamp": times} | {name: pa.array(column) for name, column in zip(COLUMNS, values.T, strict=True)}
+    [record] = records(write(pa.table(columns)))
+    assert prepare(record.recording).kinematics.sample_rate_hz == 2000.0
+
+
+def test_a_time_that_all_rows_share_is_the_impact_s_and_not_its_samples():
+    [values] = noise(1)
+    when = pa.array([1_800_000_000_000_000] * len(values), pa.timestamp("us", "UTC"))
+    columns = {"timestamp": when} | {name: pa.array(column) for name, column in zip(COLUMNS, values.T, strict=True)}
+    [record] = records(parquet(pa.table(columns)), sample_rate_hz=2000.0)
+    assert record.recording.linear_acceleration.sample_rate_hz == 2000.0

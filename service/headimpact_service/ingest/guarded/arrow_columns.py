@@ -14,6 +14,7 @@ from headimpact_service.ingest.cells import Words, number_text
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
 from headimpact_service.ingest.table import Columns, FloatArray
 
+MICROSECONDS = "us"
 UNIT_KEYS = (b"unit", b"units")
 ROWS_AT_ONCE = 8192
 MAX_LIST = 20_001
@@ -50,6 +51,9 @@ class ArrowTable:
         self._batches = batches
         self.units = {place: unit for place, field in enumerate(schema) if (unit := _unit(field)) is not None}
         self.parted = any(map(is_list_of_numbers, self._types))
+        if not self.parted:  # times that say their unit by their type; those of an impact as a whole are text
+            timed = (place for place, kind in enumerate(self._types) if is_time(kind))
+            self.units = dict.fromkeys(timed, MICROSECONDS) | self.units
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns; those of lists end to end, with the length of each impact."""
@@ -66,12 +70,21 @@ class ArrowTable:
 
     def _require_numbers(self, place: int) -> None:
         kind = self._types[place]
-        if not (is_number(kind) or is_list_of_numbers(kind)):
+        if not (is_number(kind) or is_list_of_numbers(kind) or (is_time(kind) and not self.parted)):
             raise unreadable(f"Column {place + 1} holds no numbers.")
 
 
+def is_time(kind: pa.DataType) -> bool:
+    """Whether cells of this type are instants or durations."""
+    return bool(pa.types.is_timestamp(kind) or pa.types.is_duration(kind))
+
+
 def floats(column: pa.Array) -> FloatArray:
-    """A column of numbers; NaN where a cell is empty."""
+    """A column of numbers, of times in microseconds; NaN where a cell is empty."""
+    if pa.types.is_timestamp(column.type):
+        column = column.cast(pa.timestamp(MICROSECONDS, column.type.tz), safe=False).cast(pa.int64())
+    elif pa.types.is_duration(column.type):
+        column = column.cast(pa.duration(MICROSECONDS), safe=False).cast(pa.int64())
     cast = column.cast(pa.float64(), safe=False)
     return np.ascontiguousarray(cast.to_numpy(zero_copy_only=False), dtype=np.float64)
 
