@@ -45,6 +45,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
         if count > options.max_impacts:
             raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
         yield from _read_window(plan, layout, window)
+        del window  # before the next is put together beside it
     if count == 0:
         raise Problem("unreadable-file", "The file has headings but no samples.")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -80,11 +80,13 @@ def _keyed(blocks: Iterable[Columns], keys: Sequence[int]) -> Iterator[Window]:
         held.append(block)
         count += block.rows
         if count >= WINDOW_ROWS:
-            whole = _stacked(held)
-            window, rest = parting.window(whole, first)
+            window, rest = parting.window(_stacked(held), first)
+            # a copy, and no block kept: what is given away is the only one to hold its rows
+            first, held, count = _counted(first, count - rest.rows), [_copied(rest)], rest.rows
+            del block, rest
             if window is not None:
                 yield window
-            first, held, count = _counted(first, whole.rows - rest.rows), [rest], rest.rows
+            del window
     if count:
         yield parting.last_window(_stacked(held), first)
 
@@ -178,6 +180,10 @@ def _cut(columns: Columns, start: int, stop: int) -> Columns:
         numbers={index: values[start:stop] for index, values in columns.numbers.items()},
         texts={index: cells[start:stop] for index, cells in columns.texts.items()},
     )
+
+
+def _copied(columns: Columns) -> Columns:
+    return replace(columns, numbers={index: values.copy() for index, values in columns.numbers.items()})
 
 
 def _counted(first: int, rows: int) -> int:
