@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from headimpact.brain import brain_angle_history, peak_brain_angles
     from headimpact.criteria import CRITERIA, CRITERION_KEYS, Criterion
     from headimpact.criteria.extra import EXTRA_CRITERIA, ExtraCriterion
+    from headimpact.cut_offs import NO_FILTER, PAPER, AppliedFilter, LowPass
     from headimpact.errors import (
         CalibrationError,
         HeadimpactError,
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
         UnknownCriterion,
         UnknownModel,
     )
-    from headimpact.filtering import NO_FILTER, PAPER, AppliedFilter, LowPass
     from headimpact.kinematics import HeadKinematics, Motion
     from headimpact.model_document import model_from_document, model_from_text, model_to_document
     from headimpact.preparation import Preparation, prepare, prepare_many
@@ -121,7 +121,7 @@ _MODULES = {
         "UnknownCriterion",
         "UnknownModel",
     ),
-    "filtering": ("NO_FILTER", "PAPER", "AppliedFilter", "LowPass"),
+    "cut_offs": ("NO_FILTER", "PAPER", "AppliedFilter", "LowPass"),
     "kinematics": ("HeadKinematics", "Motion"),
     "model_document": ("model_from_document", "model_from_text", "model_to_document"),
     "preparation": ("Preparation", "prepare", "prepare_many"),

@@ -8,8 +8,8 @@ from math import inf
 
 import numpy as np
 
+from headimpact.cut_offs import AppliedFilter, CutOff, corner_frequency
 from headimpact.errors import TraceError
-from headimpact.filtering import AppliedFilter, CutOff, corner_frequency
 from headimpact.published import FILTERS
 from headimpact.quality import AXES, Channel, QualityNote, check_rate, words
 from headimpact.recording import SIGNALS, TO_CRITERIA_UNIT, FloatArray, SignalName

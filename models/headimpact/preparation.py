@@ -13,8 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
+from headimpact.cut_offs import AppliedFilter
 from headimpact.errors import TraceError
-from headimpact.filtering import AppliedFilter, low_pass
+from headimpact.filtering import low_pass
 from headimpact.kinematics import (
     HeadKinematics,
     Motion,

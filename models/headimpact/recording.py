@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from headimpact.cut_offs import PAPER, LowPass
 from headimpact.errors import TraceError
-from headimpact.filtering import PAPER, LowPass
 from headimpact.published import QUALITY_LIMITS, UNITS
 
 FloatArray = NDArray[np.float64]

@@ -16,8 +16,8 @@ from scipy.special import expit
 
 from headimpact.criteria import CRITERIA, Criterion, Evaluation, evaluate, missing_reason
 from headimpact.criteria.extra import EXTRA_CRITERIA, ExtraCriterion
+from headimpact.cut_offs import AppliedFilter
 from headimpact.errors import UnknownCriterion
-from headimpact.filtering import AppliedFilter
 from headimpact.kinematics import FloatArray, HeadKinematics, Motion
 from headimpact.preparation import Preparation, blocks_of
 from headimpact.quality import QualityNote, check_truncation, check_units

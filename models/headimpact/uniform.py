@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from headimpact.filtering import LowPass
+from headimpact.cut_offs import LowPass
 from headimpact.gaps import fill_gaps
 from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import QualityNote, words

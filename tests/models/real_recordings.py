@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from headimpact.filtering import PAPER, LowPass
+from headimpact.cut_offs import PAPER, LowPass
 from headimpact.recording import Recording, Signal
 
 ROOT = Path(__file__).parents[2]

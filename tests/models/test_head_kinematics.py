@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from waveforms import burst, rotation_matrix
 
-from headimpact.filtering import NO_FILTER
+from headimpact.cut_offs import NO_FILTER
 from headimpact.kinematics import STANDARD_GRAVITY, HeadKinematics, differentiate, running_integral, transfer_to_head_cg
 from headimpact.preparation import prepare
 from headimpact.recording import Mounting, Recording, Signal

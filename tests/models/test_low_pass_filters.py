@@ -12,7 +12,8 @@ from scipy import signal
 from waveforms import recording
 
 from headimpact import filtering
-from headimpact.filtering import CHANNEL_FREQUENCY_CLASSES, NO_FILTER, PAPER, LowPass, corner_frequency, low_pass
+from headimpact.cut_offs import CHANNEL_FREQUENCY_CLASSES, NO_FILTER, PAPER, LowPass, corner_frequency
+from headimpact.filtering import low_pass
 from headimpact.preparation import prepare
 
 RATES = [1000.0, 3200.0, 10_000.0, 20_000.0]

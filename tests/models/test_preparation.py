@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from waveforms import burst, recording
 
-from headimpact.filtering import NO_FILTER, PAPER, LowPass, corner_frequency, low_pass
+from headimpact.cut_offs import NO_FILTER, PAPER, LowPass, corner_frequency
+from headimpact.filtering import low_pass
 from headimpact.kinematics import STANDARD_GRAVITY, differentiate, running_integral
 from headimpact.preparation import prepare
 from headimpact.recording import Mounting, Recording, Signal

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from waveforms import burst, rotation_matrix
 
+from headimpact.cut_offs import NO_FILTER, PAPER, LowPass
 from headimpact.errors import TraceError
-from headimpact.filtering import NO_FILTER, PAPER, LowPass
 from headimpact.preparation import BLOCK, Preparation, prepare, prepare_many
 from headimpact.recording import Mounting, Recording, Signal
 from headimpact.scoring import score, score_many

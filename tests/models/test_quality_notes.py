@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from waveforms import burst, recording
 
-from headimpact.filtering import NO_FILTER
+from headimpact.cut_offs import NO_FILTER
 from headimpact.kinematics import HeadKinematics, differentiate
 from headimpact.preparation import Preparation, prepare
 from headimpact.quality import QualityNote, check_truncation

@@ -17,7 +17,7 @@ from real_recordings import FOLDER, LOADERS, load, needs_recordings
 
 from headimpact.brain import Oscillators, peak_brain_angles
 from headimpact.criteria import CRITERION_KEYS
-from headimpact.filtering import NO_FILTER, PAPER
+from headimpact.cut_offs import NO_FILTER, PAPER
 from headimpact.preparation import Preparation, prepare
 from headimpact.published import BRAIN_MODEL
 from headimpact.risk import LAKSARI_2020, probability_of

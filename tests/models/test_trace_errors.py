@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from waveforms import burst, recording, rotation_matrix
 
+from headimpact.cut_offs import NO_FILTER
 from headimpact.errors import HeadimpactError, TraceError
-from headimpact.filtering import NO_FILTER
 from headimpact.preparation import prepare
 from headimpact.record_rules import broken_rules
 from headimpact.recording import Mounting, Recording, Signal

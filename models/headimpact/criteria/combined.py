@@ -6,7 +6,6 @@ Every function takes the motion of m impacts and returns m values, or 3 x m of t
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import expit
 
 from headimpact.brain import INERTIA_KG_M2
 from headimpact.kinematics import FloatArray, Motion, running_integral
@@ -47,6 +46,9 @@ def gambit(motion: Motion) -> FloatArray:
 
 def vtcp(motion: Motion) -> FloatArray:
     """Virginia Tech combined probability (Rowson & Duma 2013) of the peak resultants [-]."""
+    # Here, since who only needs the criteria's names, as readers of files do, does without SciPy's 25 MB.
+    from scipy.special import expit
+
     a = motion.peaks[motion.rows.linear_acceleration]
     alpha = motion.peaks[motion.rows.angular_acceleration]
     linear_predictor = (

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from headimpact.filtering import LowPass
+from headimpact.cut_offs import LowPass
 from headimpact.quality import QualityNote, words
 from headimpact.recording import AXES, AxesName, Recording, Signal, SignalName
 from headimpact_service.errors import PayloadError, Problem

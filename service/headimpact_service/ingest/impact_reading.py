@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from headimpact.cut_offs import NO_FILTER, PAPER, LowPass
 from headimpact.errors import TraceError
-from headimpact.filtering import NO_FILTER, PAPER, LowPass
 from headimpact.quality import QualityNote, check_reported_peak
 from headimpact.recording import AXES, Mounting, Recording, Signal, require_proper_rotation
 from headimpact.risk import OperatingPointRequest

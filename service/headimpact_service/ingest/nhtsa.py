@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from headimpact.filtering import PAPER
+from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from headimpact.filtering import LowPass
+from headimpact.cut_offs import LowPass
 from headimpact.recording import AxesName
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.impact_json import MAX_RATE_HZ, MIN_RATE_HZ, Axes, Filter, Name

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from headimpact.filtering import PAPER
+from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant
 from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from headimpact.filtering import LowPass
+from headimpact.cut_offs import LowPass
 from headimpact.quality import QualityNote
 from headimpact.recording import AXES, SIGNALS, Mounting, Recording, Signal
 from headimpact_service.ingest.record import ImpactRecord

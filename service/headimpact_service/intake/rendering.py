@@ -7,7 +7,7 @@ from typing import Any
 
 from headimpact.brain import brain_angle_history
 from headimpact.criteria import CRITERIA
-from headimpact.filtering import AppliedFilter
+from headimpact.cut_offs import AppliedFilter
 from headimpact.kinematics import HeadKinematics
 from headimpact.quality import QualityNote
 from headimpact.recording import AXES

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from ingest_files import RECORDINGS, codes, half_sine, needs_recordings, one, outcome, read, refused, statuses, zipped
 from laboratory import FIRST_S, INTERVAL_S, ISO_CODES, SAMPLES, channel, channels, iso_mme, text
 
-from headimpact.filtering import PAPER
+from headimpact.cut_offs import PAPER
 from headimpact.preparation import prepare
 from headimpact_service.ingest.iso_codes import head_code
 from headimpact_service.ingest.mapping import Mapping

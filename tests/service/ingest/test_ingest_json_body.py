@@ -12,7 +12,7 @@ import pytest
 from ingest_files import body, codes, encoded, kinematics, signal, six_axis
 
 from headimpact.criteria import CRITERION_KEYS
-from headimpact.filtering import NO_FILTER, PAPER
+from headimpact.cut_offs import NO_FILTER, PAPER
 from headimpact.published import QUALITY_LIMITS
 from headimpact_service.errors import Problem
 from headimpact_service.ingest import impact_json

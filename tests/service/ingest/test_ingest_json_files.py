@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ingest_files import body, codes, encoded, one, outcome, read, refused, statuses
 
-from headimpact.filtering import NO_FILTER
+from headimpact.cut_offs import NO_FILTER
 from headimpact_service.errors import Problem
 from headimpact_service.ingest import json_format, ndjson_format
 from headimpact_service.ingest.digest import content_digest

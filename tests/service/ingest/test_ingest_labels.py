@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from ingest_files import codes, csv_text, one, read, refused, six_axis
 from making import MAKERS, columns, motion, resultant
 
-from headimpact.filtering import NO_FILTER
+from headimpact.cut_offs import NO_FILTER
 from headimpact_service.ingest.file_names import NOT_NAMED, named_facts
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.presets import presets

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ingest_files import codes, half_sine, one, outcome, read, refused, statuses, zipped
 
-from headimpact.filtering import NO_FILTER, PAPER
+from headimpact.cut_offs import NO_FILTER, PAPER
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.mapping import Mapping as ColumnMapping
 from headimpact_service.ingest.record import ImpactRecord

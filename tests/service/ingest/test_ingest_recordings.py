@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ingest_files import RECORDINGS, ROOT, body, encoded, needs_recordings, one, signal, zipped
 
-from headimpact.filtering import NO_FILTER, PAPER
+from headimpact.cut_offs import NO_FILTER, PAPER
 from headimpact.preparation import prepare
 from headimpact.scoring import score
 from headimpact_service.ingest.impact_reading import read_impact
