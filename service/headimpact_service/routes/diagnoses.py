@@ -57,8 +57,8 @@ class DiagnosisList(BaseModel):
     "Report a diagnosis",
     "labels:write",
     {
-        201: Answer(DiagnosisView, "The diagnosis, with the impact that is labelled."),
-        200: Answer(DiagnosisView, "It was reported before."),
+        201: Answer(DiagnosisView, "The diagnosis, with the impact that was labelled now."),
+        200: Answer(DiagnosisView, "It was reported before, and its impact carries the label."),
     },
     body=DiagnosisBody,
     example={"session_id": "2026-09-12-match", "basis": "physician_diagnosis", "diagnosed_by": "clinician-3"},
@@ -67,7 +67,9 @@ class DiagnosisList(BaseModel):
 async def report_diagnosis(call: Call) -> Response:
     """Labels the session's impact of highest peak angular acceleration, as Laksari et al. 2020 did.
 
-    For a concussion whose impact was seen, label that impact instead.
+    Impacts that could enter no cohort are passed over. The same diagnosis again is attributed by what is stored then:
+    anew, if its impact was deleted, is another athlete's or has lost the label, or if a stronger one came in. For a
+    concussion whose impact was seen, label that impact instead.
     """
     body: DiagnosisBody = call.body
     athlete_id = _athlete(call)

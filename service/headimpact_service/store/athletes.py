@@ -10,7 +10,7 @@ from typing import Any, Literal
 from sqlalchemy import Connection, RowMapping, bindparam, delete, insert, select, update
 
 from headimpact_service.errors import Problem, not_found
-from headimpact_service.store import erasure, ids
+from headimpact_service.store import erasure, ids, labels
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.many import in_parts
@@ -170,6 +170,7 @@ def erase(conn: Connection, data_set_id: bytes, athlete_id: bytes, *, if_match: 
     require_revision(present.revision, if_match)
     erasure.erase_athletes_impacts(conn, data_set_id, athlete_id)
     conn.execute(_FORGET_MERGED, {"of_data_set": data_set_id, "athlete": athlete_id})
+    labels.forget_diagnosed(conn, data_set_id, athlete_id)
     conn.execute(_FORGET_DIAGNOSES, {"of_data_set": data_set_id, "athlete": athlete_id})
     now = next_change(conn, athletes, data_set_id)
     gone = replace(present, **_NOTHING, revision=present.revision + 1, updated_at=now, deleted_at=now)

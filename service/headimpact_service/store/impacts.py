@@ -13,7 +13,7 @@ from sqlalchemy import BindParameter, Connection, bindparam, select, update
 from headimpact_service.errors import PayloadError, Problem, not_found
 from headimpact_service.store import athletes as athlete_store
 from headimpact_service.store import devices as device_store
-from headimpact_service.store import erasure
+from headimpact_service.store import erasure, labels
 from headimpact_service.store.clock import last_change, later_than, next_change
 from headimpact_service.store.impact_inserts import content_members, first_row, insert_revisions, insert_rows
 from headimpact_service.store.impact_lists import (
@@ -231,7 +231,9 @@ def _athlete_and_device(
 def correct(
     conn: Connection, data_set_id: bytes, impact_id: bytes, new: NewImpact, *, if_match: int | None = None
 ) -> Outcome:
-    """Replace an impact's content; the revision before is kept with its trace and score.
+    """Replace an impact's content; the revision before is kept with its trace and score, and what was said of it.
+
+    Only the label of a diagnosis is taken back from an impact that is no more of that athlete and session.
 
     The content that it has already is `unchanged`, also when `if_match` is the revision before: a correction that is
     sent twice was done once.
@@ -256,6 +258,7 @@ def correct(
     conn.execute(_UPDATE, changed | {"of_data_set": data_set_id, "impact": impact_id})
     conn.execute(_SUPERSEDE, {"impact": impact_id, "before": present.revision, "superseded_at": now})
     insert_revisions(conn, [(new, changed | {"data_set_id": data_set_id, "id": impact_id})])
+    labels.withdraw_of_another(conn, data_set_id, impact_id, new.key_id)
     return Outcome("corrected", _require(conn, data_set_id, impact_id))
 
 

@@ -1,7 +1,8 @@
 """Labels: what was said of an impact, by whom and on what basis; each said thing is a row that stays.
 
 A label belongs to the impact, not to its athlete or its revision: it stays with the impact that is corrected, moved to
-another athlete, or whose athlete is merged into another.
+another athlete, or whose athlete is merged into another. One that a diagnosis of a session put on its strongest impact
+is said of the athlete: it does not follow an impact that turns out to be another's, or of another session.
 """
 
 from __future__ import annotations
@@ -11,13 +12,13 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
 
-from sqlalchemy import Connection, bindparam, insert, select, update
+from sqlalchemy import Connection, and_, bindparam, delete, insert, or_, select, update
 
 from headimpact_service.errors import not_found
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.impact_rows import external_id_digest
 from headimpact_service.store.revision import require_revision
-from headimpact_service.store.tables import impacts, labels
+from headimpact_service.store.tables import diagnoses, impacts, labels
 
 OutcomeWord = Literal["concussion", "no_concussion", "unknown"]
 Basis = Literal[
@@ -71,6 +72,28 @@ _HISTORY = (
 _LIVE = select(impacts.c.id).where(impacts.c.data_set_id == bindparam("data_set_id"), impacts.c.deleted_at.is_(None))
 _LIVE_BY_ID = _LIVE.where(impacts.c.id == bindparam("impact_id"))
 _LIVE_BY_NAME = _LIVE.where(impacts.c.external_id_digest == bindparam("digest"))
+_OF_ANOTHER = (
+    select(labels.c.impact_id)
+    .join(diagnoses, diagnoses.c.id == labels.c.diagnosis_id)
+    .join(impacts, and_(impacts.c.data_set_id == labels.c.data_set_id, impacts.c.id == labels.c.impact_id))
+    .where(
+        labels.c.data_set_id == bindparam("data_set_id"),
+        labels.c.impact_id == bindparam("impact_id"),
+        labels.c.superseded_at.is_(None),
+        labels.c.attribution == "assumed_highest_alpha",
+        or_(
+            impacts.c.athlete_id.is_distinct_from(diagnoses.c.athlete_id),
+            impacts.c.session_id.is_distinct_from(diagnoses.c.session_id),
+        ),
+    )
+)
+_FORGET_DIAGNOSED = delete(labels).where(
+    labels.c.diagnosis_id.in_(
+        select(diagnoses.c.id).where(
+            diagnoses.c.data_set_id == bindparam("data_set_id"), diagnoses.c.athlete_id == bindparam("athlete_id")
+        )
+    )
+)
 _SUPERSEDE = update(labels).where(labels.c.impact_id == bindparam("impact"), labels.c.superseded_at.is_(None))
 _TOUCH = update(impacts).where(impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact"))
 
@@ -122,6 +145,17 @@ def withdraw(
         raise not_found("label")
     require_revision(kept[-1].number, if_match)
     _append(conn, data_set_id, impact_id, kept, None, key_id)
+
+
+def withdraw_of_another(conn: Connection, data_set_id: bytes, impact_id: bytes, key_id: bytes | None = None) -> None:
+    """Take the label of a diagnosis back from an impact that is no more of the diagnosed athlete and session."""
+    if conn.execute(_OF_ANOTHER, {"data_set_id": data_set_id, "impact_id": impact_id}).first() is not None:
+        withdraw(conn, data_set_id, impact_id, key_id)
+
+
+def forget_diagnosed(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> None:
+    """Delete what an athlete's diagnoses said, also of impacts that are another's now."""
+    conn.execute(_FORGET_DIAGNOSED, {"data_set_id": data_set_id, "athlete_id": athlete_id})
 
 
 def _says(label: Label) -> NewLabel | None:

@@ -171,6 +171,26 @@ class TestDiagnoses:
         found = api.post(f"/v1/athletes/{athlete_of(api, weak)}/diagnoses", json={"session_id": "s-1"})
         assert found.json()["impact"] == weak
 
+    def test_an_impact_that_no_head_had_or_that_is_not_scored_is_not_taken_for_it(self, api: Api) -> None:
+        weak = in_session(api, "e-1", 1.0)
+        unworn = api.create("e-2", 3.0, context={"session_id": "s-1", "worn": False})["id"]
+        api.create("e-3", 4.0, context={"session_id": "s-1"}, unscorable=["The laboratory marked it invalid."])
+        found = api.post(f"/v1/athletes/{athlete_of(api, weak)}/diagnoses", json={"session_id": "s-1"})
+        assert (found.status_code, found.json()["impact"]) == (201, weak)
+        assert api.get(f"/v1/impacts/{unworn}/label").status_code == 404
+
+    def test_a_session_of_impacts_that_no_head_had_is_a_conflict(self, api: Api) -> None:
+        unworn = api.create("e-1", context={"session_id": "s-1", "worn": False})["id"]
+        found = api.post(f"/v1/athletes/{athlete_of(api, unworn)}/diagnoses", json={"session_id": "s-1"})
+        assert (found.status_code, found.json()["type"]) == (409, "/problems/label-conflict")
+        assert "no impact with rotation in this session" in found.json()["detail"]
+
+    def test_an_unverified_event_may_be_the_impact(self, api: Api) -> None:
+        weak, strong = in_session(api, "e-1", 1.0), in_session(api, "e-2", 2.0)
+        put(api, strong, {"outcome": "unknown", "basis": "video_review", "event": "unverified"})
+        found = api.post(f"/v1/athletes/{athlete_of(api, weak)}/diagnoses", json={"session_id": "s-1"})
+        assert found.json()["impact"] == strong
+
     def test_another_organisations_athlete_is_not_found(self, api: Api, make_key: Callable[..., str]) -> None:
         athlete = athlete_of(api, in_session(api, "e-1", 1.0))
         other = make_key("labels:read", "labels:write", organisation="other")
