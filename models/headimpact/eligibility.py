@@ -1,10 +1,11 @@
-"""Which impacts may enter a cohort: an adjudicated outcome, an event that was one, and consent.
+"""Which impacts may enter a cohort: an adjudicated outcome, an event that was one, consent, and each recording once.
 
 An impact without an adjudicated outcome is not one without injury: it stays out.
 """
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
 from typing import Literal
 
 from headimpact.errors import CalibrationError
@@ -15,6 +16,8 @@ INCLUSIONS: tuple[Inclusion, ...] = ("unverified", "false_positive", "not_worn")
 
 OUTCOMES = {"concussion": 1.0, "no_concussion": 0.0, "1": 1.0, "0": 0.0, "1.0": 1.0, "0.0": 0.0}
 UNDECIDED = frozenset({"", "unknown"})
+DUPLICATE = "duplicate_content"
+"""Why an impact stays out whose recording entered as another impact of its athlete."""
 
 
 def outcome_of(text: str) -> float | None:
@@ -64,4 +67,36 @@ def exclusion_reason(
         return event
     if worn is False and "not_worn" not in include:
         return "not_worn"
+    return None
+
+
+def first_of_each(recordings: Sequence[Hashable | None]) -> list[int]:
+    """The position of the first impact with the same recording, which is an impact's own where there is no earlier.
+
+    Parameters
+    ----------
+    recordings
+        What is equal where two impacts are one recording of one athlete; None where that is not known.
+    """
+    first: dict[Hashable, int] = {}
+    return [i if one is None else first.setdefault(one, i) for i, one in enumerate(recordings)]
+
+
+def contradiction(firsts: Sequence[int], outcomes: Sequence[float], names: Sequence[str]) -> CalibrationError | None:
+    """The fault of a cohort in which one recording has both outcomes: nobody could say which one holds.
+
+    Parameters
+    ----------
+    firsts
+        As :func:`first_of_each` gives them.
+    outcomes, names
+        Of the same impacts.
+    """
+    for i, first in enumerate(firsts):
+        if outcomes[i] != outcomes[first]:
+            return CalibrationError(
+                "contradictory-outcomes",
+                f"{names[first]} and {names[i]} are the same recording of one athlete with both outcomes. Take one "
+                "label back, or delete one of them.",
+            )
     return None

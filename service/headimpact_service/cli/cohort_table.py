@@ -17,7 +17,7 @@ import numpy as np
 
 from headimpact.calibration import Cohort, make_cohort
 from headimpact.criteria import CRITERION_KEYS
-from headimpact.eligibility import exclusion_reason, outcome_of
+from headimpact.eligibility import DUPLICATE, contradiction, exclusion_reason, first_of_each, outcome_of
 from headimpact.errors import CalibrationError
 from headimpact_service.cli.strain_table import COLUMNS as STRAINS
 from headimpact_service.cli.strain_table import strain_document
@@ -25,7 +25,7 @@ from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.store.tables import CRITERION_COLUMNS
 
 REQUIRED = ("athlete_id", "outcome")
-READ_TOO = ("id", "revision", "event", "athlete_consent", "worn")
+READ_TOO = ("id", "revision", "event", "athlete_consent", "worn", "input_digest")
 PARQUET_MAGIC = b"PAR1"
 GZIP_MAGIC = b"\x1f\x8b"
 NOTHING = frozenset({"", "NA"})
@@ -100,7 +100,7 @@ def read_cohort(path: Path, include: frozenset[str] = frozenset()) -> CohortTabl
     TableError
         A column is missing, or a cell is not what its column holds.
     CalibrationError
-        No row of the table enters.
+        No row of the table enters, or one recording has both outcomes.
     """
     columns = _columns(path)
     missing = [name for name in REQUIRED if name not in columns]
@@ -109,7 +109,7 @@ def read_cohort(path: Path, include: frozenset[str] = frozenset()) -> CohortTabl
     keys = _criteria(columns)
     _require_once(columns)
     outcome = [_outcome(cell, row) for row, cell in enumerate(columns["outcome"])]
-    reasons = _exclusions(columns, outcome, include)
+    reasons = _without_duplicates(columns, outcome, _exclusions(columns, outcome, include))
     entering = [row for row, reason in enumerate(reasons) if reason is None]
     athletes = _athletes(columns, entering)
     criteria = {key: np.stack([_numbers(columns, name, entering) for name in keys[key]], axis=1) for key in keys}
@@ -245,6 +245,28 @@ def _exclusions(
             zip(outcome, cells("event"), cells("athlete_consent"), cells("worn"), strict=True)
         )
     ]
+
+
+def _without_duplicates(
+    columns: Mapping[str, Sequence[Any]], outcome: Sequence[float | None], reasons: Sequence[str | None]
+) -> list[str | None]:
+    """The same reasons, and one for each row whose recording entered as another impact of its athlete.
+
+    The first is that of the first id, as in the service, whatever the order of the rows.
+    """
+    digests = columns.get("input_digest")
+    if digests is None:
+        return list(reasons)
+    ids = columns.get("id") or [""] * len(reasons)
+    rows = sorted((row for row, reason in enumerate(reasons) if reason is None), key=lambda row: (_text(ids[row]), row))
+    keys = [(_text(columns["athlete_id"][row]), _text(digests[row])) for row in rows]
+    firsts = first_of_each([key if key[1] else None for key in keys])
+    names = [_text(ids[row]) or f"Row {row}" for row in rows]
+    fault = contradiction(firsts, [outcome[row] or 0.0 for row in rows], names)
+    if fault is not None:
+        raise fault
+    repeated = {rows[i] for i, first in enumerate(firsts) if i != first}
+    return [DUPLICATE if row in repeated else reason for row, reason in enumerate(reasons)]
 
 
 def _flag(cell: Any, row: int) -> bool | None:  # noqa: ANN401 - a cell of any type

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from headimpact.eligibility import exclusion_reason, outcome_of
+from headimpact.eligibility import DUPLICATE, contradiction, exclusion_reason, first_of_each, outcome_of
+from headimpact.errors import CalibrationError
 from headimpact_service.store import cohorts, ids
 from headimpact_service.store.cohorts import CohortFilter, LabelledImpact
 from headimpact_service.store.tables import CRITERION_COLUMNS, VALUE_COLUMNS
@@ -23,11 +24,15 @@ _TIMES = frozenset({"occurred_from", "occurred_to"})
 
 @dataclass(frozen=True, slots=True)
 class Selected:
-    """The impacts that may enter a fit, and how many stay out, by reason."""
+    """The impacts that may enter a fit, and how many stay out, by reason.
+
+    `fault` is why no cohort can be made of them, although they may enter.
+    """
 
     impacts: Sequence[LabelledImpact]
     outcomes: Sequence[float]
     excluded: Mapping[str, int]
+    fault: CalibrationError | None = None
 
     @property
     def lines(self) -> list[str]:
@@ -49,7 +54,7 @@ def filter_of(wanted: Mapping[str, Any]) -> CohortFilter:
 
 
 def select(conn: Any, data_set_id: bytes, wanted: Mapping[str, Any]) -> Selected:  # noqa: ANN401 - a connection of the store
-    """The impacts of a cohort that may enter; those without a label are counted only."""
+    """The impacts of a cohort that may enter, each recording of an athlete once; the others are counted only."""
     chosen, include = filter_of(wanted), frozenset(wanted.get("include") or ())
     rows = cohorts.labelled(conn, data_set_id, chosen)
     excluded = Counter({"no_outcome": cohorts.count(conn, data_set_id, chosen) - len(rows)})
@@ -68,7 +73,12 @@ def select(conn: Any, data_set_id: bytes, wanted: Mapping[str, Any]) -> Selected
         elif outcome is not None:
             entering.append(row)
             outcomes.append(outcome)
-    return Selected(entering, outcomes, {name: number for name, number in sorted(excluded.items()) if number})
+    firsts = first_of_each([row.input_digest and (row.athlete_id, row.input_digest) for row in entering])
+    fault = contradiction(firsts, outcomes, [ids.encode("imp", row.id) for row in entering])
+    once = [i for i, first in enumerate(firsts) if i == first]
+    excluded[DUPLICATE] += len(entering) - len(once)
+    counted = {name: number for name, number in sorted(excluded.items()) if number}
+    return Selected([entering[i] for i in once], [outcomes[i] for i in once], counted, fault)
 
 
 def cohort_of(selected: Selected) -> Cohort:
@@ -77,9 +87,12 @@ def cohort_of(selected: Selected) -> Cohort:
     Raises
     ------
     CalibrationError
-        There are none.
+        There are none, or one recording has both outcomes.
     """
     from headimpact.calibration import make_cohort
+
+    if selected.fault is not None:
+        raise selected.fault
 
     table = np.array(
         [[np.nan if value is None else value for value in impact.values] for impact in selected.impacts]

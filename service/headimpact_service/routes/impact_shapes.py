@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from headimpact.quality import QualityNote
+from headimpact_service.ingest.digest import shown
 from headimpact_service.ingest.impact_json import Filter, MountingBody
 from headimpact_service.intake.exporting import CONTEXT, CONTEXT_NUMBERS, context_of
 from headimpact_service.intake.records import kinematics_document
@@ -160,6 +161,7 @@ COLUMNS = (
     "peak_resultant_angular_acceleration_rad_s2",
     "quality_codes",
     "duplicate_of",
+    "input_digest",
     "revision",
     "created_at",
     "updated_at",
@@ -198,6 +200,7 @@ def impact_cells(impact: Impact) -> list[Cell]:
         *(_NO_SCORE if impact.score is None else _score_cells(impact.score)),
         _quality_codes(impact),
         None if impact.duplicate_of is None else ids.encode("imp", impact.duplicate_of),
+        None if impact.input_digest is None else shown(impact.input_digest),
         impact.revision,
         impact.created_at,
         impact.updated_at,

@@ -39,6 +39,7 @@ class LabelledImpact:
     context: Mapping[str, Any] | None
     device: str | None
     occurred_at: datetime | None
+    input_digest: bytes | None
     values: tuple[float | None, ...]
 
 
@@ -59,6 +60,7 @@ _LABELLED = (
         impacts.c.context,
         func.coalesce(devices.c.model, "") + " " + func.coalesce(devices.c.firmware, ""),
         impacts.c.occurred_at,
+        impacts.c.input_digest,
         *(scores.c[name] for name in VALUE_COLUMNS),
     )
     .select_from(
@@ -72,7 +74,7 @@ _LABELLED = (
 )
 _COUNT = select(func.count()).select_from(_JOINED).where(*_LIVE)
 _IDS = select(impacts.c.id, impacts.c.revision).select_from(_JOINED).where(*_LIVE).order_by(impacts.c.id)
-_FIRST_VALUE = 9
+_FIRST_VALUE = 10
 
 
 def labelled(conn: Connection, data_set_id: bytes, wanted: CohortFilter) -> list[LabelledImpact]:

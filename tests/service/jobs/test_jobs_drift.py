@@ -26,7 +26,7 @@ def impacts(count: int) -> tuple[list[LabelledImpact], list[float]]:
         values[first : first + 3] = (generator.gamma(1.5, 0.04, 3)).tolist()
         when = START + timedelta(days=number)
         found.append(
-            LabelledImpact(number.to_bytes(16, "big"), 1, None, None, "", None, None, None, when, tuple(values))
+            LabelledImpact(number.to_bytes(16, "big"), 1, None, None, "", None, None, None, when, None, tuple(values))
         )
         outcomes.append(float(number > count / 2 and generator.random() < 0.3))
     return found, outcomes

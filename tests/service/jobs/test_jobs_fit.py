@@ -16,8 +16,10 @@ import pytest
 from cohorts import fill, spring_document
 from sending import Api, impact_body
 
+from headimpact.errors import CalibrationError
 from headimpact.risk import LAKSARI_2020
 from headimpact_service.cli import refit as refit_command
+from headimpact_service.cli.cohort_table import read_cohort
 from headimpact_service.deps import SCOPES
 from headimpact_service.intake.cron import next_due
 from headimpact_service.intake.scoring import Terms
@@ -138,6 +140,47 @@ class TestFit:
         assert table["excluded"] == {"consent_withdrawn": 5, "no_outcome": 1, "unverified": 1}
         do(order(api, version="all", cohort={"include": ["unverified"], "sport": "rugby"}))
         assert api.get("/v1/models/all").json()["cohort"]["n"] == 115
+
+    def test_a_recording_that_came_twice_enters_once_here_and_through_the_export(
+        self, api: Api, database: Database, mine: bytes, do: Do, tmp_path: Path
+    ) -> None:
+        fill(database, mine)
+        twice = [self.labelled(api, name, "concussion") for name in ("v1-7", "v2-7")]
+        self.labelled(api, "other", "no_concussion", athlete={"external_id": "p-99"})
+        do(order(api))
+        report = api.get("/v1/models/spring/report").json()
+        assert report["cohort"]["n"] == 122
+        assert report["table"] == {"rows": 123, "excluded": {"duplicate_content": 1}}
+        (tmp_path / "t.csv").write_bytes(api.get("/v1/impacts", headers={"accept": "text/csv"}).content)
+        options = {"criteria": ("bam", "bric"), "replicas": 20, "seed": 1}
+        request = refit_command.Request(options, frozenset(), None, None, None, "spring")
+        refit_command.run(tmp_path / "t.csv", tmp_path / "out", request)
+        theirs = json.loads((tmp_path / "out" / "report.json").read_text())
+        assert theirs["cohort"] == report["cohort"]
+        assert theirs["table"]["excluded"] == {"duplicate_content": 1}
+        api.delete(f"/v1/impacts/{twice[0]}/label")
+        do(order(api, version="one"))
+        assert api.get("/v1/models/one/report").json()["table"]["excluded"] == {"no_outcome": 1}
+        assert api.get("/v1/models/one").json()["cohort"]["n"] == 122
+
+    def labelled(self, api: Api, name: str, outcome: str, **fields: Any) -> str:
+        impact = str(api.create(name, **fields)["id"])
+        said = {"outcome": outcome, "basis": "follow_up"}
+        assert api.put(f"/v1/impacts/{impact}/label", json=said).status_code == 200
+        return impact
+
+    def test_a_recording_with_both_outcomes_is_refused_and_named(
+        self, api: Api, database: Database, mine: bytes, do: Do, tmp_path: Path
+    ) -> None:
+        fill(database, mine)
+        twice = [self.labelled(api, name, word) for name, word in (("v1-7", "concussion"), ("v2-7", "no_concussion"))]
+        done = do(order(api))
+        assert (done["state"], done["problem"]["type"]) == ("failed", "/problems/cohort-unfit")
+        told = f"{twice[0]} and {twice[1]} are the same recording of one athlete with both outcomes."
+        assert told in done["problem"]["detail"]
+        (tmp_path / "t.csv").write_bytes(api.get("/v1/impacts", headers={"accept": "text/csv"}).content)
+        with pytest.raises(CalibrationError, match="with both outcomes"):
+            read_cohort(tmp_path / "t.csv")
 
     @pytest.mark.parametrize(
         ("cohort", "told"), [({"sport": "chess"}, "has no impacts"), ({"occurred_from": "2030-01-01T00:00:00Z"}, "no")]
