@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -33,6 +33,7 @@ from headimpact.calibration.rare_events import (
     prior_offset,
     shrunk_covariance,
 )
+from headimpact.calibration.resampling import too_few_clusters
 from headimpact.calibration.robust import ClusteredCovariance, cluster_robust
 from headimpact.calibration.sample_size import SampleSize, cox_snell, max_cox_snell, riley_sample_size
 from headimpact.calibration.separation import separation
@@ -65,6 +66,10 @@ class Resamples:
         """Those of some of the impacts."""
         return Resamples(self.by_impact[rows], self.by_athlete[rows])
 
+    def without_athletes(self) -> Resamples:
+        """Those by impact alone."""
+        return Resamples(self.by_impact, self.by_athlete[:, :0])
+
 
 @dataclass(frozen=True)
 class Bootstrap:
@@ -78,11 +83,14 @@ class Bootstrap:
         Of the sample's score in each resample, B.
     failed
         Resamples whose fit did not settle, or that lack events.
+    reason
+        Why there are no resamples of this kind, though they were asked for.
     """
 
     refits: Refits
     areas: Resampled
     failed: int
+    reason: str | None = None
 
 
 @dataclass(frozen=True)
@@ -193,9 +201,12 @@ def refit_criterion(
     score = ml.linear_predictor if ml is not None else _linear(sample, firth)
     served = sample.design @ coefficients
     clusters, resamples = _renumbered(setting.clusters[rows]), setting.resamples.of(rows)
+    too_few = too_few_clusters(sample.y, clusters)
+    if too_few is not None:
+        resamples = resamples.without_athletes()
     weights = _population_weights(sample, options)
     by_impact = _bootstrap(sample, score, resamples.by_impact, ml)
-    by_athlete = _bootstrap(sample, score, resamples.by_athlete, ml)
+    by_athlete = replace(_bootstrap(sample, score, resamples.by_athlete, ml), reason=too_few)
     folded = _tried(lambda: out_of_fold(sample, setting.folds[rows]))
     return CriterionRefit(
         name=name,

@@ -107,8 +107,10 @@ def _criterion(one: CriterionRefit, found: Refit) -> dict[str, Any]:
         },
         "out_of_fold": _out_of_fold(one.out_of_fold),
         **_optimism(one.optimism),
-        "thresholds": [_threshold(point, options.level) for point in one.thresholds],
-        "served_thresholds": [_served_threshold(point, options.level) for point in one.served_thresholds],
+        "thresholds": [_threshold(point, one.by_athlete, options.level) for point in one.thresholds],
+        "served_thresholds": [
+            _served_threshold(point, one.by_athlete, options.level) for point in one.served_thresholds
+        ],
         "calibration": {
             **_agreement(one.calibration, options.level),
             "weighted_to_incidence": one.weights is not None,
@@ -182,6 +184,7 @@ def _auc(one: CriterionRefit, level: float, found: Refit) -> dict[str, Any]:
         "clustered_variance": one.auc.clustered_variance(one.sample.y, _clusters(one, found)),
         "bootstrap_interval": _pair(percentile_interval(one.by_impact.areas.auc, level)),
         "bootstrap_interval_by_athlete": _pair(percentile_interval(one.by_athlete.areas.auc, level)),
+        "bootstrap_interval_by_athlete_reason": one.by_athlete.reason,
     }
 
 
@@ -202,6 +205,7 @@ def _bootstrap(done: Bootstrap, names: list[str], level: float) -> dict[str, Any
     return {
         "replicas": int(done.refits.converged.size),
         "failed": done.failed,
+        "reason": done.reason,
         "coefficients": coefficients,
         "auc": _spread(done.areas.auc, level),
         "average_precision": _spread(done.areas.average_precision, level),
@@ -250,7 +254,7 @@ def _confusion(achieved: Confusion) -> dict[str, int]:
     }
 
 
-def _threshold(point: Threshold, level: float) -> dict[str, Any]:
+def _threshold(point: Threshold, by_athlete: Bootstrap, level: float) -> dict[str, Any]:
     achieved, bounds = point.achieved, point.bounds
     return {
         "sensitivity_target": point.target,
@@ -267,14 +271,15 @@ def _threshold(point: Threshold, level: float) -> dict[str, Any]:
         "threshold_interval_reason": bounds.reason,
         "threshold_interval_bootstrap": _pair(percentile_interval(point.by_impact, level)),
         "threshold_interval_bootstrap_by_athlete": _pair(percentile_interval(point.by_athlete, level)),
+        "threshold_interval_bootstrap_by_athlete_reason": by_athlete.reason,
         **_confusion(achieved),
     }
 
 
-def _served_threshold(point: Threshold, level: float) -> dict[str, Any]:
+def _served_threshold(point: Threshold, by_athlete: Bootstrap, level: float) -> dict[str, Any]:
     """The same on the served linear predictor, and as the probability that scores are compared with."""
     bounds = point.bounds
-    return _threshold(point, level) | {
+    return _threshold(point, by_athlete, level) | {
         "probability": float(expit(point.value)),
         "probability_interval": [None if end is None else float(expit(end)) for end in (bounds.low, bounds.high)],
     }

@@ -44,6 +44,27 @@ def counts_of_clusters(drawn: Iterable[Sequence[int] | IntArray], clusters: IntA
     return found
 
 
+def too_few_clusters(y: FloatArray, clusters: IntArray) -> str | None:
+    """Why resamples by athlete say nothing of a cohort; None where they do.
+
+    With all events of one athlete, every resample has those events or none: what they have in common looks certain.
+
+    Parameters
+    ----------
+    y
+        Outcomes, n.
+    clusters
+        The number of each impact's athlete, n.
+    """
+    injured, others = np.unique(clusters[y == 1.0]).size, np.unique(clusters[y == 0.0]).size
+    if min(injured, others) >= 2:
+        return None
+    return (
+        "Resampling athletes needs at least two with a concussion, and two with another impact; there are "
+        f"{injured} and {others}."
+    )
+
+
 def drawn_with_replacement(count: int, replicas: int, generator: np.random.Generator) -> Iterator[IntArray]:
     """Numbers below `count`, as many of them in each bootstrap resample: of impacts, or of athletes."""
     for _ in range(replicas):

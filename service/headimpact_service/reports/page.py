@@ -67,12 +67,19 @@ def refit_page(
             planes=figures.half_risk_planes(found),
             risk_map=None if model is None else figures.risk_map_of(model),
             compared=_compared(model, active),
+            no_athletes=_without_athletes(document),
         )
     )
 
 
 def _compared(model: RiskModel | None, active: RiskModel | None) -> str | None:
     return None if model is None or active is None else figures.coefficient_comparison("bam", model, active)
+
+
+def _without_athletes(document: Mapping[str, Any]) -> list[str]:
+    """Why criteria have no resamples by athlete, each reason once."""
+    reasons = [one["bootstrap"]["by_athlete"]["reason"] for one in document["criteria"].values()]
+    return list(dict.fromkeys(reason for reason in reasons if reason))
 
 
 def _ranked(document: Mapping[str, Any]) -> list[str]:

@@ -284,6 +284,34 @@ class TestTables:
         assert one["robust_covariance"] is None
         assert one["out_of_fold"]["auc"] is None
         assert one["out_of_fold"]["reason"]
+        self.has_no_interval_by_athlete(one)
+        assert "Resampling athletes needs" in (tmp_path / "out/report.html").read_text()
+
+    def test_one_athlete_with_all_concussions_gives_no_interval_by_athlete(self, tmp_path: Path, run: Run) -> None:
+        columns = simulated()
+        columns["athlete_id"] = [
+            "hurt" if y else name for y, name in zip(columns["outcome"], columns["athlete_id"], strict=True)
+        ]
+        write(tmp_path / "t.csv", columns)
+        assert run("refit", "--table", "t.csv", "--out", "out", "--replicas", "10")[0] == 0
+        self.has_no_interval_by_athlete(json.loads((tmp_path / "out/report.json").read_text())["criteria"]["bric"])
+
+    def has_no_interval_by_athlete(self, one: dict[str, Any]) -> None:
+        """No resamples by athlete, and why; those by impact are there."""
+        by_athlete, why = one["bootstrap"]["by_athlete"], one["bootstrap"]["by_athlete"]["reason"]
+        assert "at least two with a concussion" in why
+        assert (by_athlete["replicas"], by_athlete["failed"], by_athlete["auc"]["interval"]) == (0, 0, None)
+        assert all(
+            found == {"median": None, "sd": None, "interval": None} for found in by_athlete["coefficients"].values()
+        )
+        assert one["auc"]["bootstrap_interval_by_athlete"] is None
+        assert one["auc"]["bootstrap_interval_by_athlete_reason"] == why
+        for point in (*one["thresholds"], *one["served_thresholds"]):
+            assert point["threshold_interval_bootstrap_by_athlete"] is None
+            assert point["threshold_interval_bootstrap_by_athlete_reason"] == why
+        assert one["bootstrap"]["by_impact"]["replicas"] == 10
+        assert one["bootstrap"]["by_impact"]["reason"] is None
+        assert one["auc"]["bootstrap_interval"]
 
 
 class TestStrain:
