@@ -242,7 +242,8 @@ def refit(
         float | None, typer.Option(help="Concussions per impact that a case-control sample is corrected to.")
     ] = None,
     incidence_range: Annotated[
-        tuple[float, float] | None, typer.Option(help="Its least and greatest, for the range of the intercept.")
+        tuple[float, float] | None,
+        typer.Option(metavar="<least> <greatest>", help="Two numbers, for the range of the intercept: 0.001 0.02."),
     ] = None,
     bias_correction: Annotated[
         BiasCorrection, typer.Option(help="Of the bias of few events.")

@@ -215,6 +215,18 @@ class TestThresholds:
         assert bounds(27).low is None
         assert bounds(36).low is not None
 
+    @pytest.mark.parametrize(
+        ("sensitivity", "told"),
+        [
+            (0.9, "A lower bound of a threshold of 90% sensitivity needs 36 events; there are 20."),
+            (0.999, "A lower bound of a threshold of 99.9% sensitivity needs 3688 events; there are 20."),
+            (1.0, "No number of events bounds a threshold of 100% sensitivity from below; there are 20."),
+        ],
+    )
+    def test_why_a_threshold_has_no_lower_end_is_said(self, sensitivity: float, told: str) -> None:
+        y = np.array([1.0] * 20 + [0.0] * 100)
+        assert order_statistic_interval(y, np.arange(y.size, dtype=float), sensitivity).reason == told
+
     @pytest.mark.parametrize(("k", "n"), [(0, 10), (3, 10), (10, 10), (24, 27)])
     def test_clopper_pearson_covers_by_its_definition(self, k: int, n: int) -> None:
         from scipy.stats import binom

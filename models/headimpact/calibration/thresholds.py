@@ -150,9 +150,14 @@ def order_statistic_interval(y: FloatArray, score: FloatArray, sensitivity: floa
     above = ranks[binom.sf(ranks - 1, n, share) <= rest]
     low = float(ranked[below[-1] - 1]) if below.size else None
     high = float(ranked[above[0] - 1]) if above.size else None
-    reason = None
-    if low is None:
-        least = ceil(np.log(rest) / np.log(sensitivity)) if sensitivity < 1.0 else None
-        needed = "no number of events" if least is None else f"{least} events"
-        reason = f"A lower bound of a threshold of {sensitivity:.0%} sensitivity needs {needed}; there are {n}."
-    return Bounds(low, high, reason)
+    return Bounds(low, high, None if low is not None else _unbounded(sensitivity, n, rest))
+
+
+def _unbounded(sensitivity: float, events: int, rest: float) -> str:
+    """Why a threshold has no lower end."""
+    if sensitivity == 1.0:
+        return f"No number of events bounds a threshold of 100% sensitivity from below; there are {events}."
+    needed = ceil(np.log(rest) / np.log(sensitivity))
+    return (
+        f"A lower bound of a threshold of {100 * sensitivity:g}% sensitivity needs {needed} events; there are {events}."
+    )

@@ -275,6 +275,14 @@ class TestTables:
         assert one["ml_coefficients"] is None
         assert 0 < one["coefficients"]["value"] < 10
 
+    def test_a_range_of_incidences_is_given_as_its_help_shows(self, tmp_path: Path, run: Run) -> None:
+        write(tmp_path / "t.csv", simulated())
+        assert "--incidence-range <least> <greatest>" in " ".join(run("refit", "--help")[1].split())
+        arguments = ("--replicas", "0", "--incidence-range", "0.001", "0.02")
+        assert run("refit", "--table", "t.csv", "--out", "out", *arguments)[0] == 0
+        found = json.loads((tmp_path / "out/report.json").read_text())
+        assert found["options"]["incidence_range"] == [0.001, 0.02]
+
     def test_one_athlete_gives_a_fit_without_figures_by_athlete(self, tmp_path: Path, run: Run) -> None:
         columns = simulated() | {"athlete_id": ["a"] * 120}
         write(tmp_path / "t.csv", columns)
