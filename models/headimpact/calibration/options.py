@@ -30,7 +30,7 @@ class RefitOptions:
         ``case_control`` where impacts were chosen by their outcome: the intercept is corrected to the incidence.
         ``full_follow_up`` where every impact was followed up: it is not.
     incidence
-        tau, concussions per impact in the population of a case-control sample.
+        tau, concussions per impact in the population of a case-control sample; the published model's unless given.
     incidence_range
         The least and the greatest that it may be, for the range that leaves the intercept.
     bias_correction
@@ -53,7 +53,7 @@ class RefitOptions:
 
     criteria: tuple[str, ...] = ()
     sampling: Sampling = "case_control"
-    incidence: float = LAKSARI_2020.incidence
+    incidence: float | None = None
     incidence_range: tuple[float, float] | None = None
     bias_correction: BiasCorrection = "king_zeng"
     replicas: int = 1000
@@ -77,7 +77,7 @@ class RefitOptions:
             raise CalibrationError("sampling", f"The sampling is one of: {', '.join(SAMPLINGS)}.")
         if self.bias_correction not in BIAS_CORRECTIONS:
             raise CalibrationError("bias-correction", f"The bias correction is one of: {', '.join(BIAS_CORRECTIONS)}.")
-        if not 0.0 < self.incidence < 1.0:
+        if self.incidence is not None and not 0.0 < self.incidence < 1.0:
             raise CalibrationError("incidence", "An incidence must be above 0 and below 1.")
         if self.incidence_range is not None and not 0.0 < self.incidence_range[0] <= self.incidence_range[1] < 1.0:
             raise CalibrationError("incidence-range", "A range of incidences rises from above 0 to below 1.")
@@ -91,4 +91,13 @@ class RefitOptions:
     @property
     def tau(self) -> float | None:
         """The incidence that intercepts are corrected to; None where the sample is the population."""
-        return self.incidence if self.sampling == "case_control" else None
+        if self.sampling != "case_control":
+            return None
+        return LAKSARI_2020.incidence if self.incidence is None else self.incidence
+
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """Options that were given and have no use here: a sample that is the population has its own incidence."""
+        if self.sampling == "case_control":
+            return ()
+        return tuple(name for name in ("incidence", "incidence_range") if getattr(self, name) is not None)

@@ -42,6 +42,7 @@ def report_document(found: Refit) -> dict[str, Any]:
         "options": {
             "bias_correction": options.bias_correction,
             "incidence_range": _pair(options.incidence_range),
+            "ignored": list(options.ignored),
             "replicas": options.replicas,
             "resamples": "given" if options.resamples is not None else "drawn",
             "folds": options.folds if isinstance(options.folds, int) else "given",

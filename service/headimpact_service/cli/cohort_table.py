@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import gzip
-import io
-import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, nan
 from pathlib import Path
@@ -21,23 +17,18 @@ from headimpact.eligibility import DUPLICATE, contradiction, exclusion_reason, f
 from headimpact.errors import CalibrationError
 from headimpact_service.cli.strain_table import COLUMNS as STRAINS
 from headimpact_service.cli.strain_table import strain_document
+from headimpact_service.cli.table_cells import RowError, TableError, read_cells
 from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.store.tables import CRITERION_COLUMNS
 
 REQUIRED = ("athlete_id", "outcome")
 READ_TOO = ("id", "revision", "event", "athlete_consent", "worn", "input_digest")
-PARQUET_MAGIC = b"PAR1"
-GZIP_MAGIC = b"\x1f\x8b"
 NOTHING = frozenset({"", "NA"})
 """Cells without a value; R writes the second."""
 IMPACT_ID = "imp_"
 """How the service's own ids begin; in other tables a column `id` may be anything."""
 TRUTHS = {"true": "1", "false": "0"}
 """Outcomes of data frames whose column is logical, whatever their case."""
-
-
-class TableError(ValueError):
-    """A table that cannot be read as a cohort; the message names the column and the row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +45,8 @@ class CohortTable:
         Rows of the table.
     excluded
         How many rows stayed out, by reason.
+    without_athlete
+        How many of those that enter name no athlete.
     ignored
         Columns that nothing is made of.
     strain
@@ -64,6 +57,7 @@ class CohortTable:
     row_numbers: tuple[int, ...]
     rows: int
     excluded: Mapping[str, int]
+    without_athlete: int
     ignored: tuple[str, ...]
     strain: Mapping[str, Any] | None
 
@@ -80,7 +74,7 @@ class CohortTable:
         for line, rows in enumerate(drawn, start=1):
             absent = next((row for row in rows if row not in position), None)
             if absent is not None:
-                raise TableError(f"Resample {line} draws row {absent}, which is not in the cohort.")
+                raise TableError(f"Resample {line} draws row {absent} (from 0), which is not in the cohort.")
             found.append([position[row] for row in rows])
         return found
 
@@ -102,7 +96,14 @@ def read_cohort(path: Path, include: frozenset[str] = frozenset()) -> CohortTabl
     CalibrationError
         No row of the table enters, or one recording has both outcomes.
     """
-    columns = _columns(path)
+    cells = read_cells(path)
+    try:
+        return _cohort_table(cells.columns, include)
+    except RowError as fault:
+        raise cells.located(fault) from None
+
+
+def _cohort_table(columns: Mapping[str, Sequence[Any]], include: frozenset[str]) -> CohortTable:
     missing = [name for name in REQUIRED if name not in columns]
     if missing:
         raise TableError(f"The table has no column {missing[0]}; its columns are: {', '.join(list(columns)[:30])}.")
@@ -124,6 +125,7 @@ def read_cohort(path: Path, include: frozenset[str] = frozenset()) -> CohortTabl
         tuple(entering),
         len(outcome),
         dict(sorted(excluded.items())),
+        sum(not _text(columns["athlete_id"][row]) for row in entering),
         tuple(name for name in columns if name not in read),
         _strain(columns, keys),
     )
@@ -134,59 +136,6 @@ def _strain(columns: Mapping[str, Sequence[Any]], keys: Mapping[str, Sequence[st
     strains = {name: _numbers(columns, name, rows) for name in STRAINS if name in columns}
     bam = np.stack([_numbers(columns, name, rows) for name in keys["bam"]], axis=1) if "bam" in keys else None
     return strain_document(strains, bam)
-
-
-def _columns(path: Path) -> dict[str, list[Any]]:
-    """The table's cells by column: text where it is separated text."""
-    with path.open("rb") as file:
-        magic = file.read(4)
-    if magic == PARQUET_MAGIC:
-        return _parquet_columns(path)
-    content = path.read_bytes()
-    try:
-        text = (gzip.decompress(content) if magic[:2] == GZIP_MAGIC else content).decode("utf-8-sig")
-        return _csv_columns(csv.reader(io.StringIO(text, newline=""), strict=True))
-    except (UnicodeDecodeError, EOFError, zlib.error, gzip.BadGzipFile):
-        raise TableError("The table is neither Parquet nor text in UTF-8.") from None
-    except csv.Error as error:
-        raise TableError(f"The table is no separated text: {error}.") from None
-
-
-def _csv_columns(lines: Iterator[list[str]]) -> dict[str, list[Any]]:
-    names = [name.strip() for name in next(lines, [])]
-    _require_distinct(names)
-    columns: list[list[str]] = [[] for _ in names]
-    row = 0
-    for cells in lines:
-        if not cells:
-            continue
-        if len(cells) != len(names):
-            raise TableError(f"Row {row} has {len(cells)} cells where the table has {len(names)} columns.")
-        for column, cell in zip(columns, cells, strict=True):
-            column.append(cell.strip())
-        row += 1
-    return dict(zip(names, columns, strict=True))
-
-
-def _parquet_columns(path: Path) -> dict[str, list[Any]]:
-    try:
-        # Here, since a service without the extra reads CSV all the same.
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise TableError("Parquet needs an extra that is not installed here: headimpact[files].") from None
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise TableError(f"The table is no readable Parquet file: {error}".splitlines()[0]) from None
-    _require_distinct(table.column_names)
-    return {name: table.column(name).to_pylist() for name in table.column_names}
-
-
-def _require_distinct(names: Sequence[str]) -> None:
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    if twice:
-        raise TableError(f"The table has the column {twice[0] or 'without a name'} twice.")
 
 
 def _criteria(columns: Mapping[str, Any]) -> dict[str, list[str]]:
@@ -219,7 +168,7 @@ def _outcome(cell: Any, row: int) -> float | None:  # noqa: ANN401 - a cell of a
     try:
         return outcome_of("" if word in NOTHING else TRUTHS.get(word.lower(), word))
     except CalibrationError as error:
-        raise TableError(f"Row {row}, column outcome: {error}") from None
+        raise RowError(f", column outcome: {error}", row) from None
 
 
 def _require_once(columns: Mapping[str, Sequence[Any]]) -> None:
@@ -230,7 +179,7 @@ def _require_once(columns: Mapping[str, Sequence[Any]]) -> None:
         if name.startswith(IMPACT_ID) and first.setdefault(name, row) != row:
             labels = [_text(columns["outcome"][at]) or "nothing" for at in (first[name], row)]
             told = "twice" if labels[0] == labels[1] else f"with the outcomes {' and '.join(labels)}"
-            raise TableError(f"The impact {name} stands {told}, in rows {first[name]} and {row}.")
+            raise RowError(f": the impact {name} stands there {told}.", first[name], row)
 
 
 def _exclusions(
@@ -261,7 +210,7 @@ def _without_duplicates(
     rows = sorted((row for row, reason in enumerate(reasons) if reason is None), key=lambda row: (_text(ids[row]), row))
     keys = [(_text(columns["athlete_id"][row]), _text(digests[row])) for row in rows]
     firsts = first_of_each([key if key[1] else None for key in keys])
-    names = [_text(ids[row]) or f"Row {row}" for row in rows]
+    names = [_text(ids[row]) or f"the row of {digests[row]}" for row in rows]
     fault = contradiction(firsts, [outcome[row] or 0.0 for row in rows], names)
     if fault is not None:
         raise fault
@@ -272,7 +221,7 @@ def _without_duplicates(
 def _flag(cell: Any, row: int) -> bool | None:  # noqa: ANN401 - a cell of any type
     word = _text(cell).lower()
     if word not in {"", "true", "false", "1", "0"}:
-        raise TableError(f"Row {row}, column worn: true, false or nothing is needed.")
+        raise RowError(", column worn: true, false or nothing is needed.", row)
     return None if word == "" else word in {"true", "1"}
 
 
@@ -298,7 +247,7 @@ def _numbers(columns: Mapping[str, Sequence[Any]], name: str, rows: Sequence[int
         except (TypeError, ValueError):
             found[i] = inf
         if isinf(found[i]):
-            raise TableError(f"Row {row}, column {name}: a finite number or an empty cell is needed.")
+            raise RowError(f", column {name}: a finite number or an empty cell is needed.", row)
     return found
 
 

@@ -16,9 +16,10 @@ from headimpact.errors import CalibrationError
 from headimpact.model_document import MAX_VERSION, VERSION, model_from_text, model_to_document
 from headimpact.risk import PUBLISHED_MODELS, RiskModel
 from headimpact_service.answers import json_bytes
-from headimpact_service.cli.cohort_table import CohortTable, TableError, read_cohort
+from headimpact_service.cli.cohort_table import CohortTable, read_cohort
+from headimpact_service.cli.table_cells import TableError
 from headimpact_service.reports.figures import criterion_name
-from headimpact_service.reports.findings import counted
+from headimpact_service.reports.findings import counted, ignored
 from headimpact_service.reports.page import refit_page
 
 REPORT, PAGE, MODEL = "report.json", "report.html", "model.json"
@@ -110,7 +111,12 @@ def _active(name: str) -> RiskModel:
 
 
 def _table_document(held: CohortTable) -> dict[str, Any]:
-    return {"rows": held.rows, "excluded": dict(held.excluded), "ignored_columns": list(held.ignored)}
+    return {
+        "rows": held.rows,
+        "excluded": dict(held.excluded),
+        "without_athlete": held.without_athlete,
+        "ignored_columns": list(held.ignored),
+    }
 
 
 def read_folds(path: Path) -> dict[str, int]:
@@ -168,6 +174,8 @@ def _tell(held: CohortTable, document: Mapping[str, Any], written: Sequence[Path
         console.print(f"{counted(count, 'row')} left out: {reason.replace('_', ' ')}")
     if held.ignored:
         console.print(f"Columns that nothing is made of: {', '.join(held.ignored)}", markup=False)
+    for note in ignored(document):
+        console.print(note.text)
     console.print(_summary(document))
     for name, reason in document["failed"].items():
         console.print(f"{criterion_name(name)} was not fitted: {reason['detail']}", markup=False)

@@ -63,7 +63,11 @@ def _fitted(arguments: Mapping[str, Any], selected: Selected, active: RiskModel)
     found = refit(cohort, options_of(fit), active)
     model = fitted_model(found, arguments["version"], fit.get("title") or "")
     report = report_document(found) | {
-        "table": {"rows": cohort.n + sum(selected.excluded.values()), "excluded": dict(selected.excluded)},
+        "table": {
+            "rows": cohort.n + sum(selected.excluded.values()),
+            "excluded": dict(selected.excluded),
+            "without_athlete": sum(impact.athlete_id is None for impact in selected.impacts),
+        },
         "model": model.version,
         "strain": None,
         "drift": drift_document(selected, active, options_of(fit).tau),

@@ -30,6 +30,7 @@ def findings(report: Mapping[str, Any]) -> list[Finding]:
     """The findings of a report, the most weighty first."""
     found = [
         *_cohort(report),
+        *ignored(report),
         *_gates(report),
         *_best(report),
         *_direction(report),
@@ -55,6 +56,27 @@ def _cohort(report: Mapping[str, Any]) -> Iterator[Finding]:
             "warning",
             f"Only {counted(cohort['athletes_with_events'], 'athlete')} had a concussion: what was learnt may be about "
             "them rather than about heads in general.",
+        )
+
+
+def ignored(report: Mapping[str, Any]) -> Iterator[Finding]:
+    """What was given or is in the cohort, and counts otherwise than whoever gave it may think."""
+    ignored = report["options"]["ignored"]
+    if ignored:
+        named = " and ".join(name.replace("_", " ") for name in ignored)
+        yield Finding(
+            "note",
+            f"The {named} had no effect: in a full follow-up the incidence is the cohort's own share of concussions.",
+        )
+    alone = (report.get("table") or {}).get("without_athlete", 0)
+    if alone:
+        told = (
+            "1 impact names no athlete and counts" if alone == 1 else f"{alone} impacts name no athlete and count each"
+        )
+        yield Finding(
+            "note",
+            f"{told} as one of its own: if some are of one athlete, intervals by athlete are too narrow, and figures "
+            "out of fold too good.",
         )
 
 

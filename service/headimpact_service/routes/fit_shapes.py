@@ -67,7 +67,8 @@ class FitBody(Strict):
     criteria: Criteria | None = Field(default=None, description="All thirteen unless given.")
     sampling: Literal["case_control", "full_follow_up"] = Field(
         default="case_control",
-        description="`case_control` where impacts were chosen by their outcome: intercepts go to `incidence`.",
+        description="`case_control` where impacts were chosen by their outcome: intercepts go to `incidence`. In a "
+        "`full_follow_up` they do not, and an incidence has no effect.",
     )
     incidence: Incidence | None = Field(default=None, description="What GET /v1/settings shows unless given.")
     incidence_range: IncidenceRange | None = None

@@ -122,7 +122,7 @@ class TestOfTheFixture:
         assert report["cohort"]["events"] == 27
         assert report["cohort"]["athletes"] == 60
         assert report["cohort"]["incidence"] == 0.0055
-        assert report["table"] == {"rows": 914, "excluded": {}, "ignored_columns": ["impact_id"]}
+        assert report["table"] == {"rows": 914, "excluded": {}, "without_athlete": 0, "ignored_columns": ["impact_id"]}
 
     def test_the_model_says_what_the_report_says(self, done: Path, report: dict[str, Any]) -> None:
         model = model_from_text((done / "model.json").read_bytes())
@@ -229,15 +229,24 @@ class TestTables:
             (lambda c: c.pop("athlete_id"), "no column athlete_id"),
             (lambda c: c.pop("bric"), "no column of a criterion"),
             (lambda c: c.update(bam_x=c["bric"]), "has bam_x but no bam_y"),
-            (lambda c: c.update(outcome=[2, *c["outcome"][1:]]), "Row 0, column outcome"),
-            (lambda c: c.update(bric=["soft", *c["bric"][1:]]), "Row 0, column bric: a finite number"),
-            (lambda c: c.update(bric=["-inf", *c["bric"][1:]]), "Row 0, column bric: a finite number"),
-            (lambda c: c.update(id=["imp_1", "imp_1", *range(118)]), "The impact imp_1 stands "),
+            (lambda c: c.update(outcome=[2, *c["outcome"][1:]]), "Row 2 (the heading is row 1), column outcome"),
+            (
+                lambda c: c.update(bric=["soft", *c["bric"][1:]]),
+                "Row 2 (the heading is row 1), column bric: a finite number",
+            ),
+            (
+                lambda c: c.update(bric=["-inf", *c["bric"][1:]]),
+                "Row 2 (the heading is row 1), column bric: a finite number",
+            ),
+            (
+                lambda c: c.update(id=["imp_1", "imp_1", *range(118)], outcome=[0, 0, *c["outcome"][2:]]),
+                "Rows 2 and 3 (the heading is row 1): the impact imp_1 stands there twice.",
+            ),
             (
                 lambda c: c.update(id=["imp_1", "imp_1", *range(118)], outcome=[0, 1, *c["outcome"][2:]]),
-                "The impact imp_1 stands with the outcomes 0 and 1, in rows 0 and 1.",
+                "Rows 2 and 3 (the heading is row 1): the impact imp_1 stands there with the outcomes 0 and 1.",
             ),
-            (lambda c: c.update(worn=["perhaps"] * 120), "Row 0, column worn"),
+            (lambda c: c.update(worn=["perhaps"] * 120), "Row 2 (the heading is row 1), column worn"),
             (lambda c: c.update(outcome=[0] * 120), "none with a concussion"),
             (lambda c: c.update(outcome=[1] * 120), "none without a concussion"),
             (lambda c: c.update(outcome=[""] * 120), "No row of the table enters the cohort (120 no_outcome)"),
@@ -274,6 +283,28 @@ class TestTables:
         assert one["separation"] == "complete"
         assert one["ml_coefficients"] is None
         assert 0 < one["coefficients"]["value"] < 10
+
+    def test_rows_that_name_no_athlete_are_told(self, tmp_path: Path, run: Run) -> None:
+        columns = simulated()
+        columns["athlete_id"][:2] = ["", ""]
+        write(tmp_path / "t.csv", columns)
+        _, printed, _ = run("refit", "--table", "t.csv", "--out", "out", "--replicas", "0")
+        told = "2 impacts name no athlete and count each as one of its own"
+        assert told in printed
+        assert told in (tmp_path / "out/report.html").read_text()
+        report = json.loads((tmp_path / "out/report.json").read_text())
+        assert (report["table"]["without_athlete"], report["cohort"]["athletes"]) == (2, 22)
+
+    def test_an_incidence_that_a_full_follow_up_does_not_use_is_told(self, tmp_path: Path, run: Run) -> None:
+        write(tmp_path / "t.csv", simulated())
+        arguments = ("refit", "--table", "t.csv", "--out", "out", "--replicas", "0", "--sampling", "full_follow_up")
+        assert "had no effect" not in run(*arguments)[1]
+        _, printed, _ = run(*arguments, "--incidence", "0.01", "--incidence-range", "0.001", "0.02")
+        assert "The incidence and incidence range had no effect" in printed
+        report = json.loads((tmp_path / "out/report.json").read_text())
+        assert report["options"]["ignored"] == ["incidence", "incidence_range"]
+        assert report["cohort"]["incidence"] == report["cohort"]["share"]
+        assert "had no effect" in (tmp_path / "out/report.html").read_text()
 
     def test_a_range_of_incidences_is_given_as_its_help_shows(self, tmp_path: Path, run: Run) -> None:
         write(tmp_path / "t.csv", simulated())
@@ -394,7 +425,7 @@ class TestFiles:
             (b"\xff\xfe\x00a", "neither Parquet nor text"),
             (b"\x1f\x8bxyz", "neither Parquet nor text"),
             (b"PAR1nothing", "no readable Parquet"),
-            (b"athlete_id,outcome,bric\na,1\n", "Row 0 has 2 cells"),
+            (b"athlete_id,outcome,bric\na,1\n", "Row 2 (the heading is row 1) has 2 cells"),
             (b"athlete_id,outcome,outcome\n", "column outcome twice"),
             (b"", "no column athlete_id"),
         ],
@@ -404,6 +435,11 @@ class TestFiles:
         code, _, error = run("refit", "--table", "t.csv", "--out", "out")
         assert code == 2
         assert told in error
+
+    def test_rows_are_counted_as_a_spreadsheet_shows_them_past_empty_ones(self, tmp_path: Path, run: Run) -> None:
+        (tmp_path / "t.csv").write_text("athlete_id,outcome,bric\na,1,0.5\n\na,0,soft\n")
+        code, _, error = run("refit", "--table", "t.csv", "--out", "out")
+        assert (code, "Row 4 (the heading is row 1), column bric" in error) == (2, True)
 
     @pytest.mark.parametrize(
         ("arguments", "told"),

@@ -150,7 +150,7 @@ class TestFit:
         do(order(api))
         report = api.get("/v1/models/spring/report").json()
         assert report["cohort"]["n"] == 122
-        assert report["table"] == {"rows": 123, "excluded": {"duplicate_content": 1}}
+        assert report["table"] == {"rows": 123, "excluded": {"duplicate_content": 1}, "without_athlete": 0}
         (tmp_path / "t.csv").write_bytes(api.get("/v1/impacts", headers={"accept": "text/csv"}).content)
         options = {"criteria": ("bam", "bric"), "replicas": 20, "seed": 1}
         request = refit_command.Request(options, frozenset(), None, None, None, "spring")
