@@ -235,17 +235,15 @@ def correct(
 
     Only the label of a diagnosis is taken back from an impact that is no more of that athlete and session.
 
-    The content that it has already is `unchanged`, also when `if_match` is the revision before: a correction that is
-    sent twice was done once.
+    What it is already is `unchanged`, also when `if_match` is the revision before: a correction that is sent twice was
+    done once. A name that is another athlete's now is a correction, whatever was sent before.
     """
     present = _require(conn, data_set_id, impact_id)
-    kept = revisions(conn, data_set_id, impact_id)
-    same_name = new.external_id is None or new.external_id == present.external_id
+    known = _look_up(conn, data_set_id, new)
     sent_again = if_match is None or present.revision - if_match in {0, 1}
-    if kept[-1].content_digest == new.content_digest and same_name and sent_again:
+    if sent_again and _is_already(conn, data_set_id, present, new, known):
         return Outcome("unchanged", present)
     require_revision(present.revision, if_match)
-    known = _look_up(conn, data_set_id, new)
     content = content_members(new, *_athlete_and_device(conn, data_set_id, new, known))
     changed = _name(data_set_id, present, new, known) | content
     now = next_change(conn, impacts, data_set_id)
@@ -260,6 +258,15 @@ def correct(
     insert_revisions(conn, [(new, changed | {"data_set_id": data_set_id, "id": impact_id})])
     labels.withdraw_of_another(conn, data_set_id, impact_id, new.key_id)
     return Outcome("corrected", _require(conn, data_set_id, impact_id))
+
+
+def _is_already(conn: Connection, data_set_id: bytes, present: Impact, new: NewImpact, known: _Known) -> bool:
+    """Whether a correction would leave the impact as it is: content, name, and whose and which device's it is."""
+    if new.external_id is not None and new.external_id != present.external_id:
+        return False
+    if (known.athlete, known.device) != (present.athlete_id, present.device_id):
+        return False
+    return revisions(conn, data_set_id, present.id)[-1].content_digest == new.content_digest
 
 
 def _name(data_set_id: bytes, present: Impact, new: NewImpact, known: _Known) -> dict[str, Any]:

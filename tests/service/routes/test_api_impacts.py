@@ -176,6 +176,27 @@ class TestCorrect:
             answer = api.post("/v1/impacts", json=body)
             assert (answer.status_code, answer.json()["revision"]) == (200, 2)
 
+    def test_a_name_that_another_athlete_has_now_is_a_correction(self, api: Api) -> None:
+        impact = api.create("e-1")
+        address, athlete = f"/v1/impacts/{impact['id']}", f"/v1/athletes/{impact['athlete']['id']}"
+        api.patch(athlete, json={"external_id": "p-18"}, headers={"If-Match": "*"})
+        other = api.post("/v1/athletes", json={"external_id": "p-17"}).json()
+        assert api.post("/v1/impacts", json=impact_body("e-1")).json()["athlete"]["id"] == impact["athlete"]["id"]
+        for _ in range(2):
+            moved = api.put(address, json=impact_body("e-1"), headers={"If-Match": '"1"'})
+            assert (moved.status_code, moved.headers["etag"]) == (200, '"2"')
+            assert moved.json()["athlete"] == {"id": other["id"], "external_id": "p-17"}
+
+    def test_names_that_were_entered_the_wrong_way_round_are_put_right(self, api: Api) -> None:
+        first = api.create("e-1")
+        second = api.create("e-2", athlete={"external_id": "p-18"})
+        ways = {"p-x": first, "p-17": second, "p-18": first}
+        for name, of in ways.items():
+            path = f"/v1/athletes/{of['athlete']['id']}"
+            assert api.patch(path, json={"external_id": name}, headers={"If-Match": "*"}).status_code == 200
+        put = api.put(f"/v1/impacts/{first['id']}", json=impact_body("e-1"), headers={"If-Match": '"1"'})
+        assert (put.json()["revision"], put.json()["athlete"]["id"]) == (2, second["athlete"]["id"])
+
     def test_without_if_match_it_is_428(self, api: Api) -> None:
         impact = api.create()
         answer = api.put(f"/v1/impacts/{impact['id']}", json=impact_body())
