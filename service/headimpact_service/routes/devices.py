@@ -102,7 +102,10 @@ ETAG = {"ETag": "The revision, for If-Match."}
     problems=("not-found", "precondition-failed", "improper-rotation"),  # no route holds a line feed in a serial
 )
 async def put_device(call: Call) -> Response:
-    """A new mounting serves the impacts that come from now on; stored scores keep the one they were made with."""
+    """A new mounting serves the impacts that are sent or corrected from now on.
+
+    Stored scores keep the one they were made with; `PUT /v1/impacts/{id}` with the impact's body takes the new one.
+    """
     serial, revision = _serial(call), if_match(call.request)
     body: DeviceBody = call.body
     if body.mounting is not None:

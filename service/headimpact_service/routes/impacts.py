@@ -212,7 +212,11 @@ def identifier(call: Call) -> bytes:
     ),
 )
 async def correct_impact(call: Call) -> Response:
-    """The whole impact anew, also under another athlete (swapped sensors). The revision before is kept."""
+    """The whole impact anew, also under another athlete (swapped sensors). The revision before is kept.
+
+    It is scored with the device's page as it is now, also where only the context is new: the same body is a correction
+    once the device's mounting or ranges were changed. To keep the mounting of before, send it inline.
+    """
     impact_id, revision = identifier(call), if_match(call.request, required=True)
     await present(call)
     scored, new = await _scored(call, to_record(call.body))

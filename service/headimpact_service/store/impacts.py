@@ -5,6 +5,7 @@ Every function that writes runs inside the writer's transaction, so what it read
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, NamedTuple
 
@@ -261,12 +262,20 @@ def correct(
 
 
 def _is_already(conn: Connection, data_set_id: bytes, present: Impact, new: NewImpact, known: _Known) -> bool:
-    """Whether a correction would leave the impact as it is: content, name, and whose and which device's it is."""
+    """Whether a correction would leave the impact as it is: content, name, whose it is, and what its device adds."""
     if new.external_id is not None and new.external_id != present.external_id:
         return False
     if (known.athlete, known.device) != (present.athlete_id, present.device_id):
         return False
+    if present.input_digest != new.input_digest or _ranges(present.document) != _ranges(new.document):
+        return False
     return revisions(conn, data_set_id, present.id)[-1].content_digest == new.content_digest
+
+
+def _ranges(document: Mapping[str, Any] | None) -> dict[str, float | None]:
+    """What each signal's sensor can show: no digest holds it, and the device's page may say it."""
+    signals = (document or {}).get("signals", {})
+    return {name: signal["declared_range"] for name, signal in signals.items()}
 
 
 def _name(data_set_id: bytes, present: Impact, new: NewImpact, known: _Known) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import pytest
 from sending import ONSET, Api, changed, half_sine, impact_body, kinematics, score_body, signal
 
 UNKNOWN = "imp_00000000000000000000000000"
+TURNED = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 class TestSend:
@@ -82,8 +83,7 @@ class TestSend:
         assert api.get("/v1/devices/mg-0042").status_code == 200
 
     def test_signals_of_a_sensor_take_the_mounting_of_their_device(self, api: Api) -> None:
-        turned = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-        mounting = {"accelerometer": {"rotation": turned, "offset_mm": [70.0, 0.0, -60.0]}}
+        mounting = {"accelerometer": {"rotation": TURNED, "offset_mm": [70.0, 0.0, -60.0]}}
         sensor = kinematics(location="sensor")
         assert api.post("/v1/impacts", json=impact_body(kinematics=sensor)).status_code == 422
         assert api.put("/v1/devices/mg-1", json={"mounting": mounting}).status_code == 201
@@ -196,6 +196,37 @@ class TestCorrect:
             assert api.patch(path, json={"external_id": name}, headers={"If-Match": "*"}).status_code == 200
         put = api.put(f"/v1/impacts/{first['id']}", json=impact_body("e-1"), headers={"If-Match": '"1"'})
         assert (put.json()["revision"], put.json()["athlete"]["id"]) == (2, second["athlete"]["id"])
+
+    def test_the_same_body_after_the_device_s_mounting_was_corrected_is_a_correction(self, api: Api) -> None:
+        mountings = [{"accelerometer": {"rotation": TURNED, "offset_mm": [x, 0.0, -60.0]}} for x in (70.0, 20.0)]
+        sensor, device = kinematics(location="sensor"), {"serial": "mg-1"}
+        body = impact_body("e-1", kinematics=sensor, device=device)
+        api.put("/v1/devices/mg-1", json={"mounting": mountings[0]})
+        first = api.post("/v1/impacts", json=body).json()
+        address = f"/v1/impacts/{first['id']}"
+        api.put("/v1/devices/mg-1", json={"mounting": mountings[1]}, headers={"If-Match": "*"})
+        again = api.post("/v1/impacts", json=body)
+        assert (again.status_code, again.json()) == (200, first)
+        inline = [
+            api.post("/v1/score", json=score_body(kinematics=sensor | {"mounting": mounting})).json()["criteria"]
+            for mounting in mountings
+        ]
+        for _ in range(2):
+            put = api.put(address, json=body, headers={"If-Match": '"1"'})
+            assert (put.status_code, put.json()["revision"]) == (200, 2)
+            assert put.json()["score"]["criteria"] == inline[1] != inline[0]
+        kept = body | {"kinematics": sensor | {"mounting": mountings[0]}, "context": {"position": "QB"}}
+        assert api.put(address, json=kept, headers={"If-Match": '"2"'}).json()["score"]["criteria"] == inline[0]
+
+    def test_the_same_body_after_the_device_s_range_was_corrected_is_a_correction(self, api: Api) -> None:
+        clipped = [min(value, 40.0) for value in half_sine(50)]
+        body = changed(impact_body(device={"serial": "mg-1"}), "/kinematics/linear_acceleration/x", clipped)
+        impact = api.post("/v1/impacts", json=body).json()
+        api.put("/v1/devices/mg-1", json={"linear_acceleration_range_g": 40}, headers={"If-Match": "*"})
+        for _ in range(2):
+            put = api.put(f"/v1/impacts/{impact['id']}", json=body, headers={"If-Match": '"1"'}).json()
+            saturated = [note for note in put["score"]["quality"] if note["code"] == "saturated"]
+            assert (put["revision"], [note["channel"] for note in saturated]) == (2, ["x"])
 
     def test_without_if_match_it_is_428(self, api: Api) -> None:
         impact = api.create()
