@@ -252,7 +252,11 @@ class Kinematics(Strict):
     )
     location: Location = Field("head_cg", description="`sensor` needs a mounting, inline or of the device.")
     mounting: MountingBody | None = None
-    constrained_plane: Plane | None = Field(None, description="The motion outside this plane is zero.")
+    constrained_plane: Plane | None = Field(
+        None,
+        description="The motion outside this plane of the head is zero. Components outside it may be left out: of a "
+        "sensor, those that its mounting's rotation keeps out of it.",
+    )
     pre_trigger_ms: float | None = Field(
         None,
         ge=0.0,

@@ -11,7 +11,7 @@ import numpy as np
 from headimpact.cut_offs import NO_FILTER, PAPER, LowPass
 from headimpact.errors import TraceError
 from headimpact.quality import QualityNote, check_reported_peak
-from headimpact.recording import AXES, Mounting, Recording, Signal, require_proper_rotation
+from headimpact.recording import AXES, Mounting, Recording, Signal, SignalName, require_proper_rotation
 from headimpact.risk import OperatingPointRequest
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 from headimpact_service.ingest import impact_rules
@@ -64,6 +64,7 @@ def to_record(body: ScoreBody, *, time_zone: str | None = None, what: str = "bod
         metadata={"format": "json"},
         notes=tuple(_reported(kinematics, sent)),
         unscorable=tuple(unscorable or ()),
+        left_out=_left_out(kinematics, sent),
         needs_device_mounting=kinematics.location == "sensor" and kinematics.mounting is None,
         operating_points=_operating_points(body),
         include=tuple(body.include or ()),
@@ -111,6 +112,14 @@ def _require_whole(sent: Recording, what: str) -> None:
                 errors.append(PayloadError(detail="A number is needed.", code="wrong-type", pointer=place))
     if errors:
         raise rules_problem(errors[:MAX_ERRORS], what=what, count=len(errors))
+
+
+def _left_out(kinematics: Kinematics, sent: Recording) -> tuple[tuple[SignalName, str], ...]:
+    """The components that a plane of motion made needless."""
+    if kinematics.constrained_plane is None:
+        return ()
+    bodies = ((name, getattr(kinematics, name)) for name, _ in sent.signals())
+    return tuple((name, axis) for name, body in bodies for axis in AXES if getattr(body, axis) is None)
 
 
 def _reported(kinematics: Kinematics, sent: Recording) -> Iterator[QualityNote]:

@@ -2,25 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from datetime import datetime
 
+import numpy as np
+
 from headimpact.criteria.extra import EXTRA_CRITERIA
-from headimpact.recording import AXES, SIGNALS, SignalName
-from headimpact_service.errors import PayloadError
+from headimpact.quality import words
+from headimpact.recording import AXES, SIGNALS, FloatArray, Recording, SignalName
+from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.impact_json import FileImpactBody, ImpactBody, Kinematics, ScoreBody, SignalBody
+from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.times import TimeError, instant, known_zone
 
 # The axis that a plane's normal lies along: translation along it and rotation about the two others are outside.
 _NORMAL = {"sagittal": "y", "coronal": "x", "axial": "z"}
 
 
-def required_axes(signal: SignalName, constrained_plane: str | None) -> tuple[str, ...]:
-    """The components that a signal must have: all three, or those inside the plane that the motion is held to."""
-    if constrained_plane is None:
-        return AXES
+# A coefficient of a rotation below it is none: what a right angle's cosine comes to.
+_NO_PART = 1e-9
+
+
+def missing_axes(
+    signal: SignalName, given: Collection[str], constrained_plane: str | None, *, turned: bool
+) -> tuple[str, ...]:
+    """The components that a signal lacks: of all three, or of those inside the plane that the motion is held to.
+
+    Of a sensor that a mounting turns any one is enough here: :func:`require_recorded` has the rest once its rotation
+    is known.
+    """
+    needed: tuple[str, ...]
+    if constrained_plane is None or (turned and not given):
+        needed = AXES
+    else:
+        needed = () if turned else _inside(signal, constrained_plane)
+    return tuple(axis for axis in needed if axis not in given)
+
+
+def _inside(signal: SignalName, constrained_plane: str) -> tuple[str, ...]:
+    """The components of the head that a plane of motion leaves."""
     normal = _NORMAL[constrained_plane]
     return tuple(axis for axis in AXES if (axis == normal) != (signal == "linear_acceleration"))
+
+
+def require_recorded(record: ImpactRecord) -> None:
+    """Refuse a component that was left out although what moves inside the plane has a part of it.
+
+    The plane is one of the head's, so a sensor that is turned may lack only what its rotation keeps out of it.
+
+    Raises
+    ------
+    Problem
+        422 `invalid-trace`.
+    """
+    plane = record.recording.constrained_plane
+    if plane is None or not record.left_out:
+        return
+    errors = []
+    for signal, axis in record.left_out:
+        parts = _rotation(signal, record.recording)[:, AXES.index(axis)]
+        heads = [head for head in _inside(signal, plane) if abs(parts[AXES.index(head)]) > _NO_PART]
+        if heads:
+            detail = (
+                f"The {words(signal)}'s {axis} may not be left out: it is a part of the head's {' and '.join(heads)}, "
+                f"inside the {plane} plane."
+            )
+            errors.append(PayloadError(detail=detail, code="missing", pointer=f"/kinematics/{signal}/{axis}"))
+    if errors:
+        raise Problem("invalid-trace", errors[0].detail, errors=errors)
+
+
+def _rotation(signal: SignalName, recording: Recording) -> FloatArray:
+    """What takes a signal to head axes; the signs of SAE J211's axes before it leave every part where it is."""
+    mounting = recording.mounting
+    if mounting is None:
+        return np.eye(3)
+    return mounting.accelerometer_rotation if signal == "linear_acceleration" else mounting.gyroscope_rotation
 
 
 def faults(body: ScoreBody) -> list[PayloadError]:
@@ -61,18 +118,20 @@ def _kinematics(kinematics: Kinematics) -> Iterator[PayloadError]:
             pointer="/kinematics/mounting",
         )
     for name, body in signals:
-        yield from _signal(body, required_axes(name, kinematics.constrained_plane), f"/kinematics/{name}")
+        given = [axis for axis in AXES if getattr(body, axis) is not None]
+        turned = kinematics.location == "sensor"
+        missing = missing_axes(name, given, kinematics.constrained_plane, turned=turned)
+        yield from _signal(body, missing, f"/kinematics/{name}")
 
 
-def _signal(body: SignalBody, required: tuple[str, ...], place: str) -> Iterator[PayloadError]:
+def _signal(body: SignalBody, missing: tuple[str, ...], place: str) -> Iterator[PayloadError]:
     if (body.sample_rate_hz is None) == (body.time_ms is None):
         yield PayloadError(
             detail="Exactly one of sample_rate_hz and time_ms is needed.", code="rate-or-times", pointer=place
         )
-    for axis in required:
-        if getattr(body, axis) is None:
-            detail = "This component is needed: only those outside a constrained_plane may be left out."
-            yield PayloadError(detail=detail, code="missing", pointer=f"{place}/{axis}")
+    for axis in missing:
+        detail = "This component is needed: only those outside a constrained_plane may be left out."
+        yield PayloadError(detail=detail, code="missing", pointer=f"{place}/{axis}")
     yield from _lengths(body, place)
 
 

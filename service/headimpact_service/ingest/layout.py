@@ -9,7 +9,7 @@ from typing import Any
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.headings import Headings, layout_problem
-from headimpact_service.ingest.impact_rules import required_axes
+from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.mapping import TIME_UNITS, DateAndTime, Mapping, SignalColumns
 from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.unread import NOTHING_UNREAD, Unread, unread_columns
@@ -46,6 +46,11 @@ class SignalLayout:
     def columns(self) -> list[int]:
         """The columns of its components."""
         return [component.column for component in self.components if component.column is not None]
+
+    @property
+    def left_out(self) -> list[str]:
+        """The components that have no column."""
+        return [axis for axis, one in zip(AXES, self.components, strict=True) if one.column is None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,10 +165,10 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: fr
     components = {axis: _component(getattr(columns, axis), headings) for axis in AXES}
     if name not in required and all(component is None for component in components.values()):
         return None
-    needed = required_axes(name, mapping.constrained_plane)
-    for axis in needed:
-        if components[axis] is None:
-            raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
+    given = [axis for axis, component in components.items() if component is not None]
+    turned = mapping.location == "sensor" or "mounting" in (mapping.reading or {})
+    for axis in missing_axes(name, given, mapping.constrained_plane, turned=turned):
+        raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)
     _require_distinct(name, (x, y, z))
     first = min(component.column for component in (x, y, z) if component.column is not None)

@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any
 
 from headimpact.quality import QualityNote
-from headimpact.recording import Recording
+from headimpact.recording import Recording, SignalName
 from headimpact.risk import OperatingPointRequest
 from headimpact_service.errors import Problem
 
@@ -37,6 +37,8 @@ class ImpactRecord:
         What the reading had to note about the record.
     unscorable
         Why the record must be stored without a score; empty for one that can be scored.
+    left_out
+        Components that were not sent, being outside the plane of the motion: their samples are zeros.
     needs_device_mounting
         The signals are those of the sensor and no mounting came with them: the device's must be looked up.
     operating_points
@@ -55,6 +57,7 @@ class ImpactRecord:
     metadata: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[QualityNote, ...] = ()
     unscorable: tuple[str, ...] = ()
+    left_out: tuple[tuple[SignalName, str], ...] = ()
     needs_device_mounting: bool = False
     operating_points: tuple[OperatingPointRequest, ...] | None = None
     include: tuple[str, ...] = ()

@@ -140,6 +140,9 @@ class TableImpact:
             metadata=self._metadata(),
             notes=tuple(self.notes),
             unscorable=() if unscorable is None else (unscorable,),
+            left_out=tuple(
+                (name, axis) for name, _ in recording.signals() for axis in self.layout.signals[name].left_out
+            ),
             needs_device_mounting=self._location == "sensor" and recording.mounting is None,
         )
 

@@ -23,6 +23,7 @@ from headimpact.risk import (
 from headimpact.scoring import ImpactScore, score, score_many
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.digest import input_digest
+from headimpact_service.ingest.impact_rules import require_recorded
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.trace_errors import trace_problem
 from headimpact_service.intake.parts import parts
@@ -164,6 +165,7 @@ def _asked(record: ImpactRecord, terms: Terms, device: DeviceFacts) -> Scored:
     sent_digest = input_digest(record)
     needed_device = record.needs_device_mounting
     record = with_device(record, device)
+    require_recorded(record)
     if record.context.get("worn") is False:
         record = replace(record, notes=(*record.notes, NOT_WORN))
     digest = input_digest(record) if needed_device else sent_digest

@@ -327,17 +327,6 @@ class TestScores:
         assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/model")
 
 
-def test_a_planar_record_may_leave_out_what_its_plane_holds_still(api: Api) -> None:
-    planar = {
-        "constrained_plane": "sagittal",
-        "linear_acceleration": {"unit": "g", "sample_rate_hz": 1000, "x": half_sine(60), "z": half_sine(-25)},
-        "angular_velocity": {"unit": "rad/s", "sample_rate_hz": 1000, "y": half_sine(24)},
-    }
-    bam = api.post("/v1/score", json={"kinematics": planar}).json()["criteria"]["bam"]["value"]
-    assert bam["y"] > 0
-    assert bam["x"] == bam["z"] == 0
-
-
 def test_a_component_that_is_changed_by_one_unit_in_the_last_place_is_other_content(api: Api) -> None:
     api.create("e-1")
     value = half_sine(50)[ONSET + 3] + 2**-40
