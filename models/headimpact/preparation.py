@@ -36,7 +36,7 @@ from headimpact.quality import (
     check_identical,
     words,
 )
-from headimpact.record_rules import derived_out_of_range, require_samples, transferred_out_of_range
+from headimpact.record_rules import derived_out_of_range, integrated_out_of_range, require_samples, transferred_out_of_range
 from headimpact.recording import FloatArray, Recording, SignalName
 from headimpact.time_base import brought, kept_of
 from headimpact.uniform import Layout, Uniform, uniform
@@ -284,6 +284,8 @@ def _computed_out_of_range(plan: Plan, motion: Motion) -> dict[int, TraceError]:
         faults |= {place: transferred_out_of_range() for place in _beyond(motion, "linear_acceleration")}
     if plan.angular_acceleration_source == "five_point_stencil":
         faults |= {place: derived_out_of_range() for place in _beyond(motion, "angular_acceleration")}
+    if plan.angular_velocity_source == "integral":
+        faults |= {place: integrated_out_of_range() for place in _beyond(motion, "angular_velocity")}
     return faults
 
 

@@ -205,3 +205,14 @@ def derived_out_of_range() -> TraceError:
         f"The derivative of the angular velocity must stay within {bound:g} rad/s^2; check its unit and its rate.",
         signal="angular_velocity",
     )
+
+
+def integrated_out_of_range() -> TraceError:
+    """The same bound for angular velocity that was integrated: the acceleration is to blame."""
+    bound = QUALITY_LIMITS["angular_velocity"]["refused"]
+    return TraceError(
+        "value-out-of-range",
+        f"The integral of the angular acceleration must stay within {bound:g} rad/s; check its unit, its rate and its "
+        "offset from zero.",
+        signal="angular_acceleration",
+    )

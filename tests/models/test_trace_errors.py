@@ -10,7 +10,7 @@ from waveforms import burst, recording, rotation_matrix
 
 from headimpact.cut_offs import NO_FILTER
 from headimpact.errors import HeadimpactError, TraceError
-from headimpact.preparation import prepare
+from headimpact.preparation import prepare, prepare_many
 from headimpact.record_rules import broken_rules
 from headimpact.recording import Mounting, Recording, Signal
 
@@ -104,6 +104,11 @@ CASES = {
         Recording(angular_velocity=Signal(STEP, "rad/s", 1e4), low_pass=NO_FILTER),
         "angular_velocity",
     ),
+    "an integral beyond 200 rad/s": Case(
+        "value-out-of-range",
+        Recording(angular_acceleration=Signal(at(STEP * 20, 99, 0, 0.0), "rad/s^2", 500.0)),
+        "angular_acceleration",
+    ),
     "time stands still": Case("time-not-increasing", stamped(stamps(s5=0.004)), "angular_velocity", None, 5),
     "time runs backwards": Case("time-not-increasing", stamped(stamps(s5=0.0031)), "angular_velocity", None, 5),
     "time is not a number": Case("time-not-increasing", stamped(stamps(s5=np.nan)), "angular_velocity", None, 5),
@@ -171,6 +176,16 @@ def test_a_value_at_its_bound_is_still_accepted(name, unit, bound):
         assert prepare(changed).kinematics.samples == 100
     with pytest.raises(TraceError, match=f"{bound:g}"):
         prepare(recording(**{name: Signal(at(x, 50, 1, np.nextafter(bound, np.inf)), unit, 1e3)}))
+
+
+def test_an_integral_at_its_bound_is_still_accepted_and_one_of_a_block_is_refused_alone():
+    def pushed(size: float) -> Recording:
+        return Recording(angular_acceleration=Signal(at(np.zeros((101, 3)), 50, 1, size), "rad/s^2", 500.0))
+
+    whole, beyond, other = prepare_many([pushed(1e5), pushed(1.001e5), pushed(9e4)])
+    assert whole.kinematics.angular_velocity.max() == 200.0
+    assert (beyond.code, beyond.signal) == ("value-out-of-range", "angular_acceleration")
+    assert other.kinematics.angular_velocity.max() == 180.0
 
 
 @pytest.mark.parametrize("samples", [3, 20_000])
