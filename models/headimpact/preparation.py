@@ -36,7 +36,12 @@ from headimpact.quality import (
     check_identical,
     words,
 )
-from headimpact.record_rules import derived_out_of_range, integrated_out_of_range, require_samples, transferred_out_of_range
+from headimpact.record_rules import (
+    derived_out_of_range,
+    integrated_out_of_range,
+    require_samples,
+    transferred_out_of_range,
+)
 from headimpact.recording import FloatArray, Recording, SignalName
 from headimpact.time_base import brought, kept_of
 from headimpact.uniform import Layout, Uniform, uniform
