@@ -24,11 +24,18 @@ _NAMES = frozenset(
         *("player", "athlete", "subject", "wearer", "user", "participant", "team", "sensor", "device"),
     }
 )
+_MEASURED = frozenset(
+    {
+        *("temp", "temperature", "battery", "voltage", "volt", "charge", "current", "pressure", "humidity", "force"),
+        *("flag", "trigger", "triggered", "status", "threshold", "quality", "valid", "proximity", "distance", "light"),
+    }
+)
+"""Words of what changes within an impact, whatever it is of: a sensor's temperature, an event's flag."""
 _TIMES = frozenset({"time", "date", "timestamp", "datetime", "clock"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
 _TIME_OF_DAY = re.compile(r"[0-2]?[0-9]:[0-5][0-9]:[0-5][0-9](\.[0-9]{1,9})?")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,15}(\.0*)?")
-_MEASURED = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
+_WITH_PARTS = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
 ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
 STAY = 10
@@ -63,7 +70,7 @@ def unread_columns(headings: Sequence[str], read: Collection[int]) -> Unread:
             counters.append(column)
         elif words & _TIMES:
             times.append(column)
-        elif words & _NAMES:
+        elif words & _NAMES and not words & _MEASURED:
             names.append(column)
     return Unread(tuple(names), tuple(times), tuple(counters))
 
@@ -78,7 +85,7 @@ def are_several(cells: Sequence[str]) -> bool:
     """Whether a column names more than one thing: not one that is measured, nor one that numbers its rows."""
     told = [cell for cell in map(said, cells) if cell]
     distinct = set(told)
-    return 1 < len(distinct) < len(told) and not any(map(_MEASURED.fullmatch, distinct))
+    return 1 < len(distinct) < len(told) and not any(map(_WITH_PARTS.fullmatch, distinct))
 
 
 def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:

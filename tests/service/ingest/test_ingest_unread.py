@@ -66,6 +66,8 @@ def test_rows_that_an_unread_column_tells_apart_are_refused(heading: str, cells:
         ("Time of day", [f"10:01:01.{n:03}" for n in range(SAMPLES)]),
         ("Clock", [f"37:10.{n:03}" for n in range(SAMPLES)]),
         ("temperature", [20 + n // 10 for n in range(SAMPLES)]),
+        ("Sensor Temp", [20 + n // 10 for n in range(SAMPLES)]),
+        ("Event Flag", [int(n > 9) for n in range(SAMPLES)]),
         ("Player", [*[""] * 39, "A"]),
     ],
 )
