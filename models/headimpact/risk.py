@@ -7,7 +7,7 @@ usual sign, as Table 3 of Laksari et al. 2020 prints them (docs/misprints.md, 1)
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import exp, log
@@ -201,7 +201,9 @@ class OperatingPoint:
 
     `basis` is ``published``, ``interpolated`` (linear in the linear predictor between published sensitivities),
     ``cohort`` or ``requested``. `threshold_interval` is what the source's rounding leaves open, or what a cohort of its
-    size leaves open at 95 %; an end is None where the cohort has too few events to bound it.
+    size leaves open at 95 %; an end is None where the cohort has too few events to bound it. It is None where nothing
+    is known of it: of a requested threshold, and of a cohort's specificity, since the interval of a cohort's point is
+    that of its sensitivity, of which the events decide.
     """
 
     request: OperatingPointRequest
@@ -254,7 +256,7 @@ def _of_cohort(request: OperatingPointRequest, points: tuple[KnownPoint, ...], s
         if request.sensitivity is not None and point.sensitivity >= request.sensitivity - 1e-9:
             return _at(request, point, shift, "cohort")
         if request.specificity is not None and (point.specificity or 0.0) >= request.specificity - 1e-9:
-            return _at(request, point, shift, "cohort")
+            return replace(_at(request, point, shift, "cohort"), threshold_interval=None)
     raise OperatingPointUnreachable(f"No threshold on {request.criterion} reaches that in the model's cohort.")
 
 

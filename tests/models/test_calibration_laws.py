@@ -438,6 +438,14 @@ class TestFittedModels:
             assert achieved.specificity == pytest.approx(point.specificity)
             assert point.basis == "cohort"
 
+    def test_a_threshold_for_a_specificity_has_not_the_interval_of_a_sensitivity(self, model: RiskModel) -> None:
+        point = resolve_operating_point(OperatingPointRequest("bam", specificity=0.95), model)
+        assert (point.specificity or 0.0) >= 0.95
+        assert point.threshold_interval is None
+        same = resolve_operating_point(OperatingPointRequest("bam", sensitivity=point.sensitivity), model)
+        assert same.threshold == point.threshold
+        assert same.threshold_interval is not None
+
     def test_a_served_threshold_has_the_interval_of_its_report(self) -> None:
         done = refit(cohort_of(), RefitOptions(replicas=10, sensitivity_targets=(0.5, 0.8, 0.9)))
         model = fitted_model(done, "small-2")

@@ -85,7 +85,9 @@ class OperatingPointView(Shape):
     criterion: str
     requested: dict[str, float]
     threshold: float
-    threshold_interval: Annotated[list[float | None], Field(min_length=2, max_length=2)] | None
+    threshold_interval: Annotated[list[float | None], Field(min_length=2, max_length=2)] | None = Field(
+        description="Null for a threshold that was asked for, and for a fitted model's specificity."
+    )
     exceeded: bool | None
     sensitivity: float | None
     specificity: float | None
