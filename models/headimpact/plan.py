@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
 
@@ -189,7 +189,7 @@ def _undelayed(name: SignalName, track: Track, mounting: MountingNumbers | None)
         return track
     linear = name == "linear_acceleration"
     delay_s = mounting.accelerometer_delay_s if linear else mounting.gyroscope_delay_s
-    return Track(track.samples, track.rate_hz, track.start_s - delay_s)
+    return replace(track, start_s=track.start_s - delay_s)
 
 
 def _frame(name: SignalName, layout: Layout) -> Frame:

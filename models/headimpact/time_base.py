@@ -16,11 +16,15 @@ from headimpact.recording import FloatArray, SignalName
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Uniform samples of a signal: `start_s` is the first one's time on the clock that the signals share."""
+    """Uniform samples of a signal: `start_s` is the first one's time on the clock that the signals share.
+
+    `stated`: whoever sent it says its rate; otherwise its stamps do, as exactly as they are written.
+    """
 
     samples: int
     rate_hz: float
     start_s: float
+    stated: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,15 +72,20 @@ def common_time_base(tracks: Mapping[SignalName, Track]) -> TimeBase:
 
 
 def _fastest(tracks: Mapping[SignalName, Track]) -> Track:
-    """The signal of the highest rate; of those of one rate the first, whatever their stamps' last digits make of it."""
+    """The signal of the highest rate; of those of one rate the first, whatever their stamps' last digits make of it.
+
+    Stated rates are what they are: of two that differ the higher one is the faster, however little it is.
+    """
     highest = max(track.rate_hz for track in tracks.values())
     least = highest * (1.0 - QUALITY_LIMITS["record"]["same_rate"])
-    return next(track for track in tracks.values() if track.rate_hz >= least)
+    near = [track for track in tracks.values() if track.rate_hz >= least]
+    stated = max((track.rate_hz for track in near if track.stated), default=None)
+    return next(track for track in near if not track.stated or track.rate_hz == stated)
 
 
 def _way(track: Track, base: Track, first: int, last: int) -> slice | Onto:
-    alike = abs(track.rate_hz - base.rate_hz) <= 1e-9 * base.rate_hz and track.start_s == base.start_s
-    if alike:
+    noise = 0.0 if track.stated and base.stated else 1e-9
+    if abs(track.rate_hz - base.rate_hz) <= noise * base.rate_hz and track.start_s == base.start_s:
         return slice(first, last + 1)
     time_s = base.start_s + np.arange(first, last + 1) / base.rate_hz
     position = np.clip((time_s - track.start_s) * track.rate_hz, 0.0, track.samples - 1)

@@ -128,7 +128,7 @@ def _track(
         rate, start_s = rate_of(name, signal.time_s), float(signal.time_s[0])
         values = _resampled(name, values, signal.time_s, rate, notes)
     require_rate(name, rate)
-    return Track(values.shape[0], rate, start_s), values
+    return Track(values.shape[0], rate, start_s, stated=signal.time_s is None), values
 
 
 def _resampled(

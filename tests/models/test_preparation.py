@@ -174,10 +174,28 @@ def test_of_two_signals_of_one_rate_the_first_is_the_base_whatever_their_last_di
         late = stamps + 0.3e-3
         found = prepare(Recording(Signal(A, "g", time_s=stamps), Signal(W, "rad/s", time_s=late), low_pass=NO_FILTER))
         close(found.kinematics.linear_acceleration_g, A[1:])
-    slower = Signal(W, "rad/s", 1000.0 / 1.0009)
-    assert prepare(Recording(Signal(A, "g", 1000.0), slower)).kinematics.sample_rate_hz == 1000.0
-    faster = prepare(Recording(Signal(A, "g", 1000.0), Signal(W, "rad/s", 1002.0), low_pass=NO_FILTER)).kinematics
-    assert faster.sample_rate_hz == 1002.0
+    faster = Signal(W, "rad/s", time_s=np.arange(100) / 1000.5)
+    for other in (Signal(A, "g", 1000.0), Signal(A, "g", time_s=np.arange(100) / 1000.0)):
+        assert prepare(Recording(other, faster)).kinematics.sample_rate_hz == 1000.0
+
+
+@pytest.mark.parametrize("rate_hz", [1000.000001, 1000.5, 1000.9, 1001.5])
+def test_of_two_stated_rates_the_higher_is_the_base_however_little_it_is(rate_hz):
+    time_s = np.arange(100) / rate_hz
+    for slow, fast in ((0, 1), (1, 0)):
+        rates = [1000.0, rate_hz] if fast else [rate_hz, 1000.0]
+        sent = Recording(Signal(A, "g", rates[0]), Signal(W, "rad/s", rates[1]), low_pass=NO_FILTER)
+        found = prepare(sent).kinematics
+        assert found.sample_rate_hz == rate_hz
+        values = (found.linear_acceleration_g, found.angular_velocity)
+        close(values[fast], (A, W)[fast])
+        close(values[slow], interpolated((A, W)[slow], 1000.0, time_s), 1e-12)
+
+
+def test_stated_rates_that_differ_are_told_apart_beside_stamps_that_nearly_say_them():
+    stamped = Signal(ALPHA, "rad/s^2", time_s=np.arange(100) / 1000.7)
+    sent = Recording(Signal(A, "g", 1000.0), Signal(W, "rad/s", 1000.5), stamped)
+    assert prepare(sent).kinematics.sample_rate_hz == 1000.5
 
 
 def test_overlap_of_three_samples_is_enough():

@@ -12,6 +12,7 @@ from headimpact.cut_offs import LowPass
 from headimpact.quality import QualityNote, words
 from headimpact.recording import AXES, AxesName, Recording, Signal, SignalName
 from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest.stamps import may_be_stated
 from headimpact_service.ingest.table import FloatArray
 
 
@@ -45,7 +46,8 @@ def head_recording(
     """
     aligned = {name: _common(curves) for name, curves in signals.items()}
     starts = {float(curves[0].stamps_s[0]) for curves in aligned.values()}
-    start_s, stamped = min(starts), len(starts) > 1
+    rates = [curves[0].rate for curves in aligned.values()]
+    start_s, stamped = min(starts), len(starts) > 1 or not may_be_stated(rates)
     sent: dict[str, Any] = {name: _signal(curves, stamped=stamped) for name, curves in aligned.items()}
     return Recording(
         axes=axes,
@@ -103,7 +105,7 @@ def _on_the_same_stamps(curves: Sequence[Curve]) -> list[Curve]:
 
 
 def _signal(curves: Sequence[Curve], *, stamped: bool) -> Signal:
-    """One signal on its rate or, where the signals do not begin together, on its stamps: they are on one clock.
+    """One signal on its rate or, where the signals do not begin together or nearly share a rate, on its stamps.
 
     Stamps are thousandths of milliseconds, as all that can be sent again are.
     """

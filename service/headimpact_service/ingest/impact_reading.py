@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import isnan
 from typing import Any, TypeVar
 
@@ -11,7 +11,16 @@ import numpy as np
 from headimpact.cut_offs import NO_FILTER, PAPER, LowPass
 from headimpact.errors import TraceError
 from headimpact.quality import QualityNote, check_reported_peak
-from headimpact.recording import AXES, Mounting, Recording, Signal, SignalName, require_proper_rotation
+from headimpact.recording import (
+    AXES,
+    SIGNALS,
+    FloatArray,
+    Mounting,
+    Recording,
+    Signal,
+    SignalName,
+    require_proper_rotation,
+)
 from headimpact.risk import OperatingPointRequest
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 from headimpact_service.ingest import impact_rules
@@ -26,7 +35,7 @@ from headimpact_service.ingest.impact_json import (
 )
 from headimpact_service.ingest.json_faults import parse, rules_problem
 from headimpact_service.ingest.record import ImpactRecord
-from headimpact_service.ingest.stamps import before_zero_ms, nominal_rate
+from headimpact_service.ingest.stamps import before_zero_ms, may_be_stated, nominal_rate
 
 Body = TypeVar("Body", bound=ScoreBody)
 
@@ -74,11 +83,17 @@ def to_record(body: ScoreBody, *, time_zone: str | None = None, what: str = "bod
 
 def recording(kinematics: Kinematics) -> Recording:
     """The kinematics of a body as the science takes them."""
-    uniform = _share_their_start(kinematics)
+    stamps = {
+        name: np.array(body.time_ms) / 1000.0
+        for name in SIGNALS
+        if (body := getattr(kinematics, name)) is not None and body.time_ms is not None
+    }
+    rates = _rates(kinematics, stamps)
+    signals: dict[SignalName, Signal | None] = {
+        name: _signal(getattr(kinematics, name), stamps.get(name), rates.get(name)) for name in SIGNALS
+    }
     return Recording(
-        linear_acceleration=_signal(kinematics.linear_acceleration, uniform=uniform),
-        angular_velocity=_signal(kinematics.angular_velocity, uniform=uniform),
-        angular_acceleration=_signal(kinematics.angular_acceleration, uniform=uniform),
+        **signals,
         axes=kinematics.axes,
         mounting=None if kinematics.mounting is None else mounting(kinematics.mounting),
         constrained_plane=kinematics.constrained_plane,
@@ -159,23 +174,28 @@ def _require_rotation(rotation: list[list[float]], sensor: str, place: str) -> N
         raise Problem("improper-rotation", str(error), errors=[fault]) from None
 
 
+def _rates(kinematics: Kinematics, stamps: Mapping[SignalName, FloatArray]) -> dict[SignalName, float | None]:
+    """The rates that stand for stamps; none where stamps have to show when a signal begins, or that rates are one."""
+    if not stamps or not _share_their_start(kinematics):
+        return {}
+    rates = {name: nominal_rate(stamps_s) for name, stamps_s in stamps.items()}
+    return rates if may_be_stated(rates.values()) else {}
+
+
 def _share_their_start(kinematics: Kinematics) -> bool:
     """Whether every signal starts at one instant: only then may stamps be replaced by the rate that they say."""
     starts = {None if body.time_ms is None else body.time_ms[0] for body in _signals(kinematics)}
     return len(starts) == 1
 
 
-def _signal(body: Any, *, uniform: bool) -> Signal | None:  # noqa: ANN401 - one of three bodies, each with its unit
+def _signal(body: Any, stamps_s: FloatArray | None, rate: float | None) -> Signal | None:  # noqa: ANN401 - one of three bodies, each with its unit
     if body is None:
         return None
     values = _samples(body)
-    if body.time_ms is None:
-        return Signal(values=values, unit=body.unit, sample_rate_hz=body.sample_rate_hz, declared_range=body.range)
-    stamps_s = np.array(body.time_ms) / 1000.0
-    rate = nominal_rate(stamps_s) if uniform else None
-    if rate is not None:
-        return Signal(values=values, unit=body.unit, sample_rate_hz=rate, declared_range=body.range)
-    return Signal(values=values, unit=body.unit, time_s=stamps_s, declared_range=body.range)
+    if stamps_s is None:
+        rate = body.sample_rate_hz
+    times = stamps_s if rate is None else None
+    return Signal(values=values, unit=body.unit, sample_rate_hz=rate, time_s=times, declared_range=body.range)
 
 
 def _samples(body: SignalBody) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ ROUNDED_TO_MS = (1.0, 0.1, 0.01)
 """What stamps are written to."""
 NEAR, DRIFT = 0.6, 0.02
 """How far a stamp may be from where a stated rate has its sample: in samples, and by what went by since the first."""
+SAME_RATE: float = QUALITY_LIMITS["record"]["same_rate"]
+"""Relative: rates that stamps say and that differ less are one rate."""
 UNIFORM_JITTER: float = QUALITY_LIMITS["record"]["uniform_jitter"]
 """Of the step: stamps that stray less from a straight line are rounded, not jittered."""
 
@@ -33,6 +36,15 @@ def nominal_rate(stamps_s: FloatArray) -> float | None:
     if not float(strays.max()) <= UNIFORM_JITTER * step + rounding_s(stamps_s):
         return None
     return rate_said(stamps_s)
+
+
+def may_be_stated(rates: Iterable[float | None]) -> bool:
+    """Whether rates that the stamps of one record say may stand for them: not if they are one rate, written as several.
+
+    A stated rate is taken as it is, so that of two the higher one would have all signals brought to its samples.
+    """
+    said = sorted(rate for rate in rates if rate is not None)
+    return all(lower == higher or lower < higher * (1.0 - SAME_RATE) for lower, higher in pairwise(said))
 
 
 def before_zero_ms(spans: Iterable[tuple[float, float]]) -> float | None:

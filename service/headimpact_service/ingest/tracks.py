@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from headimpact.recording import SignalName
-from headimpact_service.ingest.stamps import nominal_rate
+from headimpact_service.ingest.stamps import may_be_stated, nominal_rate
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.windows import Rows
 
@@ -40,13 +40,15 @@ def time_bases(tracks: Sequence[Track]) -> list[TimeBase]:
     """The rate of each track, as stated or as its uniform stamps say, else its stamps.
 
     A rate that is only said by stamps stands for them where all signals begin together: a rate says nothing of when a
-    signal begins, and nobody says when one of a stated rate does.
+    signal begins, and nobody says when one of a stated rate does. Nor does it where stamps say nearly one rate.
     """
     stamped = [track for track in tracks if track.rate is None and track.stamps is not None]
     times = {id(track.stamps): _seconds(track, _origin(stamped)) for track in stamped}
     starts = {float(seconds[0]) for seconds in times.values() if seconds.size}
     together = len(starts) <= 1 and len(stamped) in {0, len(tracks)}
     rates = {key: nominal_rate(seconds) if together else None for key, seconds in times.items()}
+    if not may_be_stated(rates.values()):
+        rates = dict.fromkeys(rates)
     bases: list[TimeBase] = []
     for track in tracks:
         if track.rate is not None or track.stamps is None:

@@ -479,6 +479,21 @@ def test_signals_that_start_at_different_times_keep_their_stamps():
     assert recording.angular_velocity.time_s[0] == 0.002
 
 
+@pytest.mark.parametrize(("rate", "kept"), [(1000.5, True), (1000.0, False), (2000.0, False)])
+def test_stamps_that_nearly_say_one_rate_are_kept(rate: float, kept: bool):
+    samples = six_axis()
+    recording = read_impact(
+        encoded(
+            with_kinematics(
+                linear_acceleration=signal("g", samples[:, :3], time_ms=[float(i) for i in range(40)]),
+                angular_velocity=signal("rad/s", samples[:, 3:], time_ms=[i * 1000.0 / rate for i in range(40)]),
+            )
+        )
+    ).recording
+    rates = [None if sent is None else sent.sample_rate_hz for _, sent in recording.signals()]
+    assert rates == ([None, None] if kept else [1000.0, rate])
+
+
 @pytest.mark.parametrize("model", [ImpactBody, ScoreBody])
 def test_the_models_describe_themselves_for_openapi(model: type[ScoreBody]):
     schema = model.model_json_schema()

@@ -79,6 +79,16 @@ class TestOwnTimes:
             ("/linear_acceleration/time", "column-missing")
         ]
 
+    def test_times_of_their_own_that_nearly_say_one_rate_are_kept(self):
+        rows = [[i, *row[:3], i / 1.0005, *row[3:]] for i, row in enumerate(six_axis().tolist())]
+        own = mapping(
+            linear_acceleration=ACCELERATION | {"time": {"column": "ta", "unit": "ms"}},
+            angular_velocity=VELOCITY | {"time": {"column": "tw", "unit": "ms"}},
+        )
+        recording = one(table(["ta", "ax", "ay", "az", "tw", "wx", "wy", "wz"], rows), mapping=own).recording
+        assert [sent.sample_rate_hz for _, sent in recording.signals()] == [None, None]
+        assert prepare(recording).kinematics.sample_rate_hz == 1000.0
+
     def test_rates_of_their_own_may_be_stated(self):
         own = mapping(
             linear_acceleration=ACCELERATION | {"sample_rate_hz": 1600},
