@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from typing import Any, Literal
 
@@ -18,6 +19,7 @@ from headimpact_service.routes.tables import Cell
 from headimpact_service.store import ids
 from headimpact_service.store.impact_lists import DUPLICATE
 from headimpact_service.store.impact_rows import Impact
+from headimpact_service.store.keys import KeyRow
 from headimpact_service.store.score_rows import Score
 from headimpact_service.store.tables import CRITERION_COLUMNS, PROBABILITY_COLUMNS, VALUE_COLUMNS
 
@@ -71,7 +73,8 @@ class ImpactView(Shape):
     source: dict[str, Any] = Field(description="The form it came in, and what its file said besides.")
     duplicate_of: str | None = Field(description="An earlier impact with the same signals.")
     outcome: Literal["concussion", "no_concussion", "unknown"] | None = Field(
-        description="What its label says; null as long as nobody has labelled it."
+        description="What its label says; null as long as nobody has labelled it, and for a key without the scope "
+        "`labels:read`."
     )
     revision: int
     created_at: datetime
@@ -95,6 +98,11 @@ class ImpactList(Shape):
 
     data: list[ImpactView | ImpactTombstone]
     next_cursor: str | None
+
+
+def shown_to(key: KeyRow, impact: Impact) -> Impact:
+    """The impact as a key may see it: what its label says only with the scope of labels."""
+    return impact if "labels:read" in key.scopes else replace(impact, outcome=None, event=None)
 
 
 def impact_document(impact: Impact) -> dict[str, Any]:
@@ -170,7 +178,10 @@ COLUMNS = (
     "athlete_consent",
     *_REST,
 )
-"""Of an impact as a row of a table. `outcome` and `event` are empty as long as nobody has labelled the impact."""
+"""Of an impact as a row of a table.
+
+`outcome` and `event` are empty as long as nobody has labelled the impact, and for a key that may not read labels.
+"""
 NUMBERS = CONTEXT_NUMBERS | {
     "incidence",
     *VALUE_COLUMNS,

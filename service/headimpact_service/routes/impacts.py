@@ -29,6 +29,7 @@ from headimpact_service.routes.impact_shapes import (
     ImpactView,
     impact_cells,
     impact_document,
+    shown_to,
 )
 from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
@@ -63,8 +64,8 @@ async def create_impact(call: Call) -> Response:
     scored, new = await _scored(call, record)
     outcome = await deps.write(call.request, lambda conn: impacts.add(conn, call.data_set_id, new))
     if outcome.status == "created":
-        return _answer(outcome.impact, 201, scored)
-    return _answer(outcome.impact, 200, scored, redelivered=True)
+        return _answer(call, outcome.impact, 201, scored)
+    return _answer(call, outcome.impact, 200, scored, redelivered=True)
 
 
 async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
@@ -73,8 +74,8 @@ async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
     return scored, new_impact(scored, content_digest(record, scored.sent_digest), call.key.id)
 
 
-def _answer(impact: Impact, status: int, scored: Scored, *, redelivered: bool = False) -> Response:
-    document = impact_document(impact)
+def _answer(call: Call, impact: Impact, status: int, scored: Scored, *, redelivered: bool = False) -> Response:
+    document = impact_document(shown_to(call.key, impact))
     if redelivered and impact.score is not None:
         as_asked(document["score"], impact.score, scored)
     if "traces" in scored.record.include:
@@ -124,6 +125,8 @@ class ImpactQuery(SyncQuery):
 async def list_impacts(call: Call) -> Response:
     """With `updated_since` in the order of change, deleted impacts as tombstones.
 
+    What labels say (`outcome`, in tables `event` too) is shown to keys with the scope `labels:read`.
+
     With `include=traces`, NDJSON holds an impact a line as `POST /v1/imports` takes it, CSV and Parquet a sample a row.
     """
     query: ImpactQuery = call.query
@@ -136,9 +139,9 @@ async def list_impacts(call: Call) -> Response:
         lambda conn, after, limit: impacts.page(
             conn, call.data_set_id, filters, updated_since=query.updated_since, limit=limit, after=after
         ),
-        impact_document,
+        lambda impact: impact_document(shown_to(call.key, impact)),
         COLUMNS,
-        impact_cells,
+        lambda impact: impact_cells(shown_to(call.key, impact)),
         numbers=NUMBERS,
         flags=CONTEXT_FLAGS,
         form=trace_form if traces else None,
@@ -176,7 +179,7 @@ def _filters(query: ImpactQuery) -> ImpactFilters:
 async def read_impact(call: Call) -> Response:
     """The same as the answer to its POST, without traces."""
     found = await present(call)
-    return answer(impact_document(found), headers=etag(found.revision))
+    return answer(impact_document(shown_to(call.key, found)), headers=etag(found.revision))
 
 
 async def present(call: Call) -> Impact:
@@ -223,7 +226,7 @@ async def correct_impact(call: Call) -> Response:
     outcome = await deps.write(
         call.request, lambda conn: impacts.correct(conn, call.data_set_id, impact_id, new, if_match=revision)
     )
-    return _answer(outcome.impact, 200, scored, redelivered=outcome.status == "unchanged")
+    return _answer(call, outcome.impact, 200, scored, redelivered=outcome.status == "unchanged")
 
 
 @routes(

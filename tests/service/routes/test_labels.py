@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Callable
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from sending import Api, impact_body
 
 LABEL = {"outcome": "concussion", "basis": "physician_diagnosis", "event": "verified", "labelled_by": "clinician-3"}
 NONE = {"outcome": "no_concussion", "basis": "follow_up"}
+TABLES: dict[str, Callable[[bytes], list[dict[str, Any]]]] = {
+    "text/csv": lambda data: list(csv.DictReader(io.StringIO(data.decode()))),
+    "application/x-ndjson": lambda data: [json.loads(line) for line in data.splitlines()],
+    "application/vnd.apache.parquet": lambda data: pq.read_table(io.BytesIO(data)).to_pylist(),
+}
+"""The tables that a list is answered as, and how each is read."""
 
 
 def put(api: Api, impact: str, body: dict[str, Any], **request: Any) -> Any:
@@ -43,6 +51,30 @@ class TestOneLabel:
         assert label["labelled_by"] == "clinician-3"
         assert label["key"].startswith("key_")
         assert len(label["history"]) == 1
+
+    def test_a_key_that_may_not_read_labels_sees_no_outcome_anywhere(
+        self, api: Api, make_key: Callable[..., str]
+    ) -> None:
+        impact = api.create("e-1")
+        address = f"/v1/impacts/{impact['id']}"
+        put(api, impact["id"], LABEL)
+        device, reader = make_key("impacts:write"), make_key("impacts:read")
+        body, changes = impact_body("e-1"), {"If-Match": '"1"'}
+        answers = [
+            api.get(address, key=reader).json(),
+            *api.get("/v1/impacts", key=reader).json()["data"],
+            *api.get("/v1/impacts", key=reader, params={"updated_since": impact["updated_at"]}).json()["data"],
+            api.post("/v1/impacts", key=device, json=body).json(),
+            api.put(address, key=device, json=body, headers=changes).json(),
+            api.put(address, key=device, json=impact_body("e-1", 1.1), headers=changes).json(),
+        ]
+        assert [answer["outcome"] for answer in answers] == [None] * 6
+        for media_type, read in TABLES.items():
+            (row,) = read(api.get("/v1/impacts", key=reader, headers={"Accept": media_type}).content)
+            assert (row["outcome"] or None, row["event"] or None) == (None, None), media_type
+            both = make_key("impacts:read", "labels:read")
+            (row,) = read(api.get("/v1/impacts", key=both, headers={"Accept": media_type}).content)
+            assert (row["outcome"], row["event"]) == ("concussion", "verified"), media_type
 
     def test_the_impact_and_its_row_in_a_table_show_the_outcome(self, api: Api) -> None:
         impact = api.create("e-1")["id"]
