@@ -299,7 +299,9 @@ class ScoreBody(Strict):
     context: Context | None = None
     kinematics: Kinematics
     operating_points: Annotated[list[OperatingPointBody], Field(max_length=MAX_OPERATING_POINTS)] | None = Field(
-        None, description="Answered in this order; the organisation's default where left out."
+        None,
+        description="Answered in this order; the organisation's default where left out. One that the model lacks "
+        "is 422 where it is asked for here, and answered with null and a `reason` where it is a default.",
     )
     include: Annotated[list[Literal["traces"]], Field(max_length=1)] | None = Field(
         None, description="`traces` adds the filtered head kinematics and the brain-angle history."

@@ -16,9 +16,10 @@ from headimpact.scoring import CriterionScore, ImpactScore
 from headimpact_service import __version__
 from headimpact_service.ingest.digest import shown
 from headimpact_service.intake.records import axes_lists
-from headimpact_service.intake.scoring import Scored
+from headimpact_service.intake.scoring import MissingPoint, Scored
 from headimpact_service.store.score_rows import NewScore
 
+_OF_A_POINT = ("threshold", "threshold_interval", "exceeded", "sensitivity", "specificity", "basis")
 _UNITS = tuple((criterion.key, criterion.unit) for criterion in CRITERIA)
 
 
@@ -101,7 +102,10 @@ def note_document(note: QualityNote) -> dict[str, Any]:
     return shown
 
 
-def _operating_point(point: OperatingPoint, score: ImpactScore | None) -> dict[str, Any]:
+def _operating_point(point: OperatingPoint | MissingPoint, score: ImpactScore | None) -> dict[str, Any]:
+    if isinstance(point, MissingPoint):
+        asked = {"criterion": point.request.criterion, "requested": point.request.requested}
+        return asked | dict.fromkeys(_OF_A_POINT) | {"reason": point.reason}
     return _point(point, None if score is None else score.criteria[point.request.criterion].probability)
 
 

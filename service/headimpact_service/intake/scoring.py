@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,6 +28,17 @@ from headimpact_service.ingest.trace_errors import trace_problem
 from headimpact_service.intake.parts import parts
 
 
+@dataclass(frozen=True, slots=True)
+class MissingPoint:
+    """A default operating point that the model does not have, and why."""
+
+    request: OperatingPointRequest
+    reason: str
+
+
+Points = tuple[OperatingPoint | MissingPoint, ...]
+
+
 @dataclass(frozen=True)
 class Terms:
     """What an organisation has its impacts scored with."""
@@ -38,16 +48,18 @@ class Terms:
     model: RiskModel = LAKSARI_2020
 
     @cached_property
-    def known_points(self) -> tuple[OperatingPoint, ...]:
-        """The thresholds of the organisation's operating points, as far as the model has them.
+    def default_points(self) -> Points:
+        """The thresholds of the organisation's operating points, each in its place, also where the model has none.
 
-        A model that lacks one that was set is not promoted; the defaults are BAM's, which a model may lack.
+        A model that lacks one that was set is not promoted, but a sandbox or a score made anew may have another model.
         """
-        found = []
-        for request in self.operating_points:
-            with suppress(OperatingPointUnreachable):
-                found.append(resolve_operating_point(request, self.model, self.incidence))
-        return tuple(found)
+        return tuple(self._default(request) for request in self.operating_points)
+
+    def _default(self, request: OperatingPointRequest) -> OperatingPoint | MissingPoint:
+        try:
+            return resolve_operating_point(request, self.model, self.incidence)
+        except OperatingPointUnreachable as error:
+            return MissingPoint(request, str(error))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +82,7 @@ class Scored:
     terms: Terms
     score: ImpactScore | None
     preparation: Preparation | None
-    points: tuple[OperatingPoint, ...]
+    points: Points
     reasons: tuple[str, ...]
     sent_digest: bytes
     """SHA-256 of the kinematics as they were sent."""
@@ -233,10 +245,16 @@ def terms_of(incidence: float | None, points: Iterable[Mapping[str, object]], mo
     return Terms(incidence, requests_of(points) or DEFAULT_OPERATING_POINTS, model)
 
 
-def operating_points(asked: Sequence[OperatingPointRequest] | None, terms: Terms) -> tuple[OperatingPoint, ...]:
-    """The thresholds that were asked for, in that order; the organisation's default where none were."""
+def operating_points(asked: Sequence[OperatingPointRequest] | None, terms: Terms) -> Points:
+    """The thresholds that were asked for, in that order; the organisation's default where none were.
+
+    Raises
+    ------
+    Problem
+        422 `operating-point-unreachable` for one that was asked for and that the model does not have.
+    """
     if asked is None:
-        return terms.known_points
+        return terms.default_points
     return tuple(_point(request, terms, index) for index, request in enumerate(asked))
 
 

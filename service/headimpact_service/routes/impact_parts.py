@@ -216,7 +216,7 @@ async def _terms(call: Call, body: NewScoreBody) -> Terms:
     points = call.terms.operating_points if asked is None else requests_of(asked)
     terms = Terms(incidence=call.terms.incidence, operating_points=points, model=model)
     if asked is not None:
-        operating_points(points, terms)  # one that was asked for is not left out in silence
+        operating_points(points, terms)  # one that was asked for is refused where the model lacks it
     return terms
 
 

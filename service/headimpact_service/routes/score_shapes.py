@@ -80,18 +80,22 @@ CriteriaView = create_model(
 
 
 class OperatingPointView(Shape):
-    """A threshold on a criterion's probability, and on which side of it this impact lies."""
+    """A threshold on a criterion's probability, and on which side of it this impact lies.
+
+    The organisation's default point that the model does not have stands in its place, all null, with the `reason`.
+    """
 
     criterion: str
     requested: dict[str, float]
-    threshold: float
+    threshold: float | None
     threshold_interval: Annotated[list[float | None], Field(min_length=2, max_length=2)] | None = Field(
         description="Null for a threshold that was asked for, and for a fitted model's specificity."
     )
     exceeded: bool | None
     sensitivity: float | None
     specificity: float | None
-    basis: Literal["published", "interpolated", "cohort", "requested"]
+    basis: Literal["published", "interpolated", "cohort", "requested"] | None
+    reason: str | None = Field(None, description="Why the model does not have it; absent where it has.")
 
 
 class FilterView(Shape):

@@ -315,7 +315,42 @@ class TestService:
         assert refused.json()["type"] == "/problems/operating-point-unreachable"
         api.patch("/v1/settings", json={"operating_points": None})
         assert self.promote(api, "spring", 0).status_code == 200
-        assert api.create("e")["score"]["operating_points"] == []
+        points = api.create("e")["score"]["operating_points"]
+        assert [(point["requested"], point["threshold"]) for point in points] == [
+            ({"sensitivity": 0.5}, None),
+            ({"sensitivity": 0.9}, None),
+        ]
+
+    def test_a_default_point_that_another_model_lacks_is_answered_in_its_place_with_the_reason(
+        self, api: Api, spring: dict[str, Any], make_key: Callable[..., str]
+    ) -> None:
+        register(api, spring)
+        assert self.promote(api, "spring", 0).status_code == 200
+        points = [{"criterion": "bric", "sensitivity": 0.9}, {"criterion": "bam", "sensitivity": 0.9}]
+        assert api.patch("/v1/settings", json={"operating_points": points}).status_code == 200
+        impact = api.create("e", 2.0)
+        sandbox = make_key(mode="test")
+        scores = f"/v1/impacts/{impact['id']}/scores"
+        stored = api.post("/v1/impacts", key=sandbox, json=impact_body("e", 2.0)).json()
+        answers = [
+            api.post("/v1/score", key=sandbox, json={"kinematics": impact_body(scale=2.0)["kinematics"]}).json(),
+            stored["score"],
+            api.post("/v1/impacts", key=sandbox, json=impact_body("e", 2.0)).json()["score"],
+            api.get(f"/v1/impacts/{stored['id']}", key=sandbox).json()["score"],
+            api.post(scores, json={"model": "laksari-2020"}).json(),
+            api.get(scores).json()["data"][1],
+        ]
+        missing = dict.fromkeys(("threshold_interval", "exceeded", "sensitivity", "specificity", "basis", "threshold"))
+        for answer in answers:
+            first, second = answer["operating_points"]
+            reason = first.pop("reason")
+            assert first == missing | {"criterion": "bric", "requested": {"sensitivity": 0.9}}
+            assert reason == "Model laksari-2020 has no operating points for bric; ask for a threshold instead."
+            assert (second["criterion"], second["exceeded"]) == ("bam", True)
+            assert "reason" not in second
+        assert [point["basis"] for point in impact["score"]["operating_points"]] == ["cohort", "cohort"]
+        asked = api.post(scores, json={"model": "laksari-2020", "operating_points": points})
+        assert (asked.status_code, asked.json()["errors"][0]["pointer"]) == (422, "/operating_points/0")
 
     def test_models_belong_to_their_data_set(
         self, api: Api, spring: dict[str, Any], make_key: Callable[..., str]
