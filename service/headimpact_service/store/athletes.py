@@ -185,9 +185,9 @@ def merge(
     What `into` does not say of itself is taken from the other. The other leaves a tombstone that keeps its external
     id, so that impacts that are sent under it find their way. A consent that either withdrew is withdrawn.
     """
+    source, target = require(conn, data_set_id, athlete_id), require(conn, data_set_id, into)
     if athlete_id == into:
         raise Problem("conflict", "An athlete cannot be merged into itself.")
-    source, target = require(conn, data_set_id, athlete_id), require(conn, data_set_id, into)
     require_revision(source.revision, if_match)
     _move_all(conn, data_set_id, athlete_id, into)
     now = next_change(conn, athletes, data_set_id)

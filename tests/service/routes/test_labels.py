@@ -340,6 +340,17 @@ class TestMoves:
         assert api.get(f"/v1/impacts/{two}/label").json()["outcome"] == "concussion"
         assert len(api.get(f"/v1/athletes/{target}/diagnoses").json()["data"]) == 1
 
+    def test_an_athlete_who_is_not_there_is_404_also_merged_into_itself(
+        self, api: Api, make_key: Callable[..., str]
+    ) -> None:
+        mine = athlete_of(api, api.create("e-1")["id"])
+        other = make_key(organisation="other")
+        for athlete, key in (("ath_00000000000000000000000000", api.key), ("ath_zzz", api.key), (mine, other)):
+            answer = api.post(f"/v1/athletes/{athlete}/merge", key=key, json={"into": athlete})
+            assert (answer.status_code, answer.json()["type"]) == (404, "/problems/not-found")
+        itself = api.post(f"/v1/athletes/{mine}/merge", json={"into": mine})
+        assert (itself.status_code, itself.json()["type"]) == (409, "/problems/conflict")
+
     def test_impacts_sent_later_under_the_merged_name_find_their_way(self, api: Api) -> None:
         one, two = in_session(api, "e-1", 1.0, "p-17"), in_session(api, "e-2", 2.0, "p-17b")
         source, target = athlete_of(api, two), athlete_of(api, one)
