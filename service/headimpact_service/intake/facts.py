@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import cache, partial
 from typing import Any
 
@@ -85,8 +86,14 @@ def with_population_note(record: ImpactRecord, athlete: Athlete | None) -> Impac
 
 
 def _age_years(record: ImpactRecord, athlete: Athlete | None) -> float | None:
-    """The age at the impact, of a birth year at most: a year's last birthday counts."""
-    if athlete is not None and athlete.birth_year is not None and record.occurred_at is not None:
+    """The age at the impact, of a birth year at most: a year's last birthday counts.
+
+    Of an impact of no known time it is at most the age now, and what the context says if that is less.
+    """
+    said: float | None = record.context.get("age_years")
+    if athlete is None or athlete.birth_year is None:
+        return said
+    if record.occurred_at is not None:
         return float(record.occurred_at.year - athlete.birth_year)
-    age_years: float | None = record.context.get("age_years")
-    return age_years
+    now = float(datetime.now(UTC).year - athlete.birth_year)
+    return now if said is None else min(now, said)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
@@ -182,6 +183,18 @@ class TestPopulation:
         api.post("/v1/athletes", json={"external_id": "p-17", **athlete})
         found = notes(sent(api, impact_body("e-1", context=context)), "outside_model_population")
         assert [reason in note["detail"] for note in found] == ([] if reason is None else [True])
+
+    @pytest.mark.parametrize(
+        ("age_now", "context", "noted"),
+        [(14, {}, True), (14, {"age_years": 25}, True), (30, {}, False), (30, {"age_years": 15}, True)],
+    )
+    def test_of_an_impact_of_no_known_time_the_age_at_its_receipt_counts(
+        self, api: Api, age_now: int, context: dict[str, Any], noted: bool
+    ) -> None:
+        born = datetime.now(UTC).year - age_now
+        api.post("/v1/athletes", json={"external_id": "p-17", "birth_year": born})
+        body = impact_body("e-1", context=context, occurred_at=None)
+        assert bool(notes(sent(api, body), "outside_model_population")) == noted
 
     def test_a_score_without_an_athlete_has_the_note_of_its_context(self, api: Api) -> None:
         body = {"kinematics": impact_body()["kinematics"], "context": {"sex": "female"}}
