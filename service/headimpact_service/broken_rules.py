@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from pydantic_core import ErrorDetails
 
-# pydantic's error type -> (our code, the sentence; {…} are bounds that pydantic gives with the error).
+# pydantic's error type -> (our code, the sentence; {…} are bounds that pydantic gives with the error). A bound has all
+# of its digits: rounded, it might be the value that is refused.
 RULES: Mapping[str, tuple[str, str]] = {
     "missing": ("missing", "This field is required."),
     "extra_forbidden": ("unknown-field", "This field is not known here."),
@@ -27,10 +28,10 @@ RULES: Mapping[str, tuple[str, str]] = {
     "string_too_long": ("too-long", "The number of characters must be at most {max_length}."),
     "string_pattern_mismatch": ("control-character", "Control characters are refused."),
     "literal_error": ("not-allowed", "One of these is needed: {expected}."),
-    "greater_than": ("out-of-range", "A value above {gt:g} is needed."),
-    "greater_than_equal": ("out-of-range", "A value of at least {ge:g} is needed."),
-    "less_than": ("out-of-range", "A value below {lt:g} is needed."),
-    "less_than_equal": ("out-of-range", "A value of at most {le:g} is needed."),
+    "greater_than": ("out-of-range", "A value above {gt:.15g} is needed."),
+    "greater_than_equal": ("out-of-range", "A value of at least {ge:.15g} is needed."),
+    "less_than": ("out-of-range", "A value below {lt:.15g} is needed."),
+    "less_than_equal": ("out-of-range", "A value of at most {le:.15g} is needed."),
     "cut_off_form": ("wrong-type", "A filter is a cut-off in Hz, CFC60, CFC180, CFC600, CFC1000 or null."),
     "filter_form": ("wrong-type", 'A filter is "paper", "none" or an object with a cut-off for each signal.'),
 }

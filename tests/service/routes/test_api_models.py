@@ -31,5 +31,10 @@ class TestModels:
         assert vtcp["critical_values"][0]["value"] is None
         assert vtcp["critical_values"][0]["reason"]
 
+    def test_a_bound_that_is_almost_the_refused_value_is_told_with_all_its_digits(self, api: Api) -> None:
+        for value, bound in {"1": "at most 0.999999999", "0": "at least 1e-09"}.items():
+            answer = api.get("/v1/models/laksari-2020/risk-map", params={"incidence": value})
+            assert (answer.status_code, answer.json()["errors"][0]["detail"]) == (422, f"A value of {bound} is needed.")
+
     def test_an_unknown_version_is_404(self, api: Api) -> None:
         assert api.get("/v1/models/laksari-2031").status_code == 404
