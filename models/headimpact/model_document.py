@@ -26,7 +26,7 @@ MAX_TEXT = 2000
 MAX_NUMBER = 1e300
 """Squares and sums of larger ones would overflow."""
 MAX_VERSION = 100
-VERSION = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+VERSION = re.compile(rf"[A-Za-z0-9][A-Za-z0-9._-]{{0,{MAX_VERSION - 1}}}")
 
 
 def model_to_document(model: RiskModel) -> dict[str, Any]:

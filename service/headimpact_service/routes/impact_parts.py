@@ -23,6 +23,7 @@ from headimpact_service.intake.scoring import Terms, operating_points, score_rec
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import Query
 from headimpact_service.routes.impacts import identifier, present
+from headimpact_service.routes.models import Version
 from headimpact_service.routes.operating_points import requests_of
 from headimpact_service.routes.score_shapes import ScoreView, Shape, TraceView
 from headimpact_service.store import impacts, scores, traces
@@ -157,7 +158,7 @@ class StoredScoreList(Shape):
 class NewScoreBody(Strict):
     """A score to be made anew from what is stored, under the organisation's present settings."""
 
-    model: Word = Field(description="Version of a model.", examples=["laksari-2020"])
+    model: Version = Field(description="Version of a model.")
     operating_points: Annotated[list[OperatingPointBody], Field(max_length=MAX_OPERATING_POINTS)] | None = None
     extra_criteria: Annotated[list[Word], Field(max_length=32)] | None = None
     make_current: bool = Field(default=False, description="Whether it stands for the impact from now on.")

@@ -40,7 +40,7 @@ from headimpact_service.store.models import NewModel, StoredModel
 routes = Routes("models")
 
 VERSION = f"^{model_document.VERSION.pattern}$"
-Version = Annotated[str, Field(pattern=VERSION, max_length=100, examples=["laksari-2020"])]
+Version = Annotated[str, Field(pattern=VERSION, max_length=model_document.MAX_VERSION, examples=["laksari-2020"])]
 DOCUMENT_BYTES = 16 * 1024 * 1024
 ALIASES: tuple[AliasName, ...] = ("active", "candidate")
 

@@ -323,8 +323,10 @@ class TestScores:
 
     def test_an_unknown_model_is_422(self, api: Api) -> None:
         impact = api.create()
-        answer = api.post(f"/v1/impacts/{impact['id']}/scores", json={"model": "nix"})
-        assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/model")
+        for version, code in {"nix": "unknown-model", "v" * 100: "unknown-model", "v" * 101: "too-long"}.items():
+            answer = api.post(f"/v1/impacts/{impact['id']}/scores", json={"model": version})
+            assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/model")
+            assert answer.json()["errors"][0]["code"] == code
 
 
 def test_a_component_that_is_changed_by_one_unit_in_the_last_place_is_other_content(api: Api) -> None:
