@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import Connection, bindparam, delete, select, update
 
+from headimpact_service.store import jobs
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.tables import impact_revisions, impacts, labels, scores
@@ -23,6 +24,9 @@ _REVISION = [
     delete(table).where(table.c.impact_id == bindparam("impact"), table.c.revision == bindparam("number_of_revision"))
     for table in (scores, impact_revisions)
 ]
+_NAMES = select(impacts.c.external_id).where(
+    impacts.c.athlete_id == bindparam("athlete_id"), impacts.c.external_id.is_not(None)
+)
 _MOVED = select(impact_revisions.c.impact_id, impact_revisions.c.revision).where(
     impact_revisions.c.athlete_id == bindparam("athlete_id"), impact_revisions.c.superseded_at.is_not(None)
 )
@@ -50,7 +54,13 @@ def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes],
 
 
 def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> None:
-    """Erase an athlete's impacts, and their revisions of impacts that were corrected to another athlete."""
+    """Erase an athlete's impacts, and their revisions of impacts that were corrected to another athlete.
+
+    What jobs say of deliveries under the impacts' external ids is left without these.
+    """
+    names = frozenset(conn.execute(_NAMES, {"athlete_id": athlete_id}).scalars())
+    if names:
+        jobs.forget_names(conn, data_set_id, names)
     mine = select(impacts.c.id).where(impacts.c.athlete_id == athlete_id)
     known = conn.execute(mine.where(impacts.c.deleted_at.is_(None))).scalars().all()
     erase_impacts(conn, data_set_id, list(known), external_ids=True)

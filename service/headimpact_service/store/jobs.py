@@ -5,7 +5,7 @@ What a process does that works on one is in :mod:`.job_runs`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
@@ -15,7 +15,7 @@ from sqlalchemy import Connection, bindparam, insert, select, update
 from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import ids
 from headimpact_service.store.paging import Page, Position, keyset, page_of
-from headimpact_service.store.tables import jobs
+from headimpact_service.store.tables import job_chunks, jobs
 
 State = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
 ENDED: frozenset[str] = frozenset({"succeeded", "failed", "cancelled"})
@@ -76,6 +76,20 @@ _LIST = select(*(column for column in jobs.c if column.name not in {"arguments",
 _ONE = _OF_DATA_SET.where(jobs.c.id == bindparam("job_id"))
 _BY_KEY = _OF_DATA_SET.where(jobs.c.idempotency_key == bindparam("idempotency_key"))
 _CANCEL = update(jobs).where(jobs.c.id == bindparam("job"))
+_REFUSED = select(jobs.c.id, jobs.c.details).where(
+    jobs.c.data_set_id == bindparam("data_set_id"), jobs.c.details.is_not(None)
+)
+_REFUSED_SO_FAR = (
+    select(job_chunks.c.job_id, job_chunks.c.number, job_chunks.c.outcome)
+    .join(jobs, jobs.c.id == job_chunks.c.job_id)
+    .where(jobs.c.data_set_id == bindparam("data_set_id"))
+)
+_SET_DETAILS = update(jobs).where(jobs.c.id == bindparam("of_job")).values(details=bindparam("document"))
+_SET_OUTCOME = (
+    update(job_chunks)
+    .where(job_chunks.c.job_id == bindparam("of_job"), job_chunks.c.number == bindparam("of_number"))
+    .values(outcome=bindparam("document"))
+)
 
 
 def submit(conn: Connection, data_set_id: bytes, new: NewJob) -> Job:
@@ -171,3 +185,31 @@ def cancel(conn: Connection, data_set_id: bytes, job_id: bytes) -> Job:
         values |= {"state": "cancelled", "finished_at": now, "problem": problem.as_dict(), "arguments": {}}
     conn.execute(_CANCEL, {"job": job_id, **values})
     return require(conn, data_set_id, job_id)
+
+
+def forget_names(conn: Connection, data_set_id: bytes, external_ids: Set[str]) -> None:
+    """Take external ids out of what jobs say of the impacts that they refused; the rows stay, and count."""
+    parameters = {"data_set_id": data_set_id}
+    ended = [
+        {"of_job": job, "document": document}
+        for job, details in conn.execute(_REFUSED, parameters)
+        if (document := _without_names(details, external_ids)) is not None
+    ]
+    under_way = [
+        {"of_job": job, "of_number": number, "document": document}
+        for job, number, outcome in conn.execute(_REFUSED_SO_FAR, parameters)
+        if (document := _without_names(outcome, external_ids)) is not None
+    ]
+    if ended:
+        conn.execute(_SET_DETAILS, ended)
+    if under_way:
+        conn.execute(_SET_OUTCOME, under_way)
+
+
+def _without_names(document: Mapping[str, Any], external_ids: Set[str]) -> dict[str, Any] | None:
+    """The document with these names as null; None where it has none of them."""
+    refused = document.get("failed")
+    if not isinstance(refused, list) or not any(row["external_id"] in external_ids for row in refused):
+        return None
+    rows = [row | {"external_id": None} if row["external_id"] in external_ids else row for row in refused]
+    return {**document, "failed": rows}

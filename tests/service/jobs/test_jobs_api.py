@@ -187,3 +187,31 @@ class TestCancel:
         assert api.delete(f"/v1/jobs/{job['id']}").status_code == 409
         assert api.get(f"/v1/jobs/{job['id']}").json()["result"] == short | {"failed": []}
         assert api.get("/v1/jobs").json()["data"][0]["result"] == short
+
+
+def test_an_erased_athlete_s_external_ids_go_from_what_jobs_say_of_their_impacts(api: Api, database: Database) -> None:
+    """An import that refused to store them again, with other content."""
+    mine, others = {"external_id": "p-17"}, {"external_id": "p-18"}
+    athlete = api.create("e-1", athlete=mine)["athlete"]["id"]
+    deleted = api.create("e-2", athlete=mine)
+    assert api.delete(f"/v1/impacts/{deleted['id']}").status_code == 204
+    api.create("e-3", athlete=others)
+    again = [impact_body(name, 1.5, athlete=of) for name, of in (("e-1", mine), ("e-2", mine), ("e-3", others))]
+    job = order(api, "\n".join(map(json.dumps, again)).encode()).json()
+    job_id = ids.decode("job", job["id"])
+    assert job_id is not None
+    rows = api.post("/v1/imports", content="\n".join(map(json.dumps, again)).encode(), headers=NDJSON).json()["data"]
+    result: dict[str, Any] = {"summary": {"created": 0, "unchanged": 0, "failed": 3}, "failed_not_shown": 0}
+
+    def end(conn: Any) -> None:
+        job_runs.begin(conn, job_id, 1)
+        job_runs.finish(conn, job_id, 1, "failed", result=result, details={"failed": rows})
+
+    database.write(end)
+    address = f"/v1/jobs/{job['id']}"
+    assert [row["external_id"] for row in api.get(address).json()["result"]["failed"]] == ["e-1", "e-2", "e-3"]
+    assert api.delete(f"/v1/athletes/{athlete}").status_code == 204
+    left = api.get(address).json()["result"]
+    assert [row["external_id"] for row in left["failed"]] == [None, None, "e-3"]
+    assert [row["problem"]["type"] for row in left["failed"]] == [row["problem"]["type"] for row in rows]
+    assert left["summary"] == result["summary"]

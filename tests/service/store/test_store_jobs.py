@@ -145,6 +145,33 @@ class TestEnd:
             assert [kept.id for kept in job_runs.unfinished(conn)] == [other.id]
 
 
+class TestNames:
+    """What jobs say of impacts that they refused, once these impacts are erased."""
+
+    @staticmethod
+    def failed(*names: str | None) -> dict[str, Any]:
+        rows = [{"index": i, "external_id": name, "status": "failed"} for i, name in enumerate(names)]
+        return {"summary": {"failed": len(rows)}, "failed": rows}
+
+    def test_of_an_ended_job_and_one_under_way_the_erased_names_go_and_the_rows_stay(
+        self, database: Database, data_set: bytes, job: Job
+    ) -> None:
+        other = database.write(lambda conn: jobs.submit(conn, data_set, NewJob(kind="import", arguments={})))
+        for each in (job, other):
+            begun(database, each)
+            database.write(lambda conn, of=each: job_runs.commit(conn, of.id, 1, 0, 3, lambda _: self.failed("a", "b")))
+            database.write(lambda conn, of=each: job_runs.commit(conn, of.id, 1, 1, 1, lambda _: self.failed("c")))
+        details = self.failed("a", "b", None)
+        database.write(lambda conn: job_runs.finish(conn, job.id, 1, "succeeded", result={}, details=details))
+        stranger = database.write(lambda conn: keys.create_key(conn, "Stranger", ["all"]))[0].data_set_id
+        database.write(lambda conn: jobs.forget_names(conn, stranger, {"a", "c"}))
+        assert read(database, job).details == details
+        database.write(lambda conn: jobs.forget_names(conn, data_set, {"a", "never"}))
+        assert read(database, job).details == self.failed(None, "b", None)
+        with database.read() as conn:
+            assert job_runs.outcomes(conn, other.id) == [self.failed(None, "b"), self.failed("c")]
+
+
 def test_another_data_set_s_job_is_not_there(database: Database, job: Job) -> None:
     stranger = database.write(lambda conn: keys.create_key(conn, "Stranger", ["all"]))[0]
     with database.read() as conn:
