@@ -67,6 +67,7 @@ class CsvTable:
         self._quoted = text.quoted
         self._line = 0
         self._begun, self._empty_rows = False, 0
+        self._joined = False
         self._ends: list[int] = []  # the line that each row of a block ends in
         heading, has_units = self._find_headings(skip_rows)
         self._delimiter = delimiter_of(heading)
@@ -88,6 +89,7 @@ class CsvTable:
                 rows=len(samples),
                 numbers=dict(zip(numbers, columns, strict=True)),
                 texts=dict(zip(texts, cells, strict=True)),
+                joined=self._joined,
             )
 
     def _find_headings(self, skip_rows: int) -> tuple[str, bool]:
@@ -149,7 +151,7 @@ class CsvTable:
 
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
         """A block cell by cell, saying what is wrong with it."""
-        full = [fitted for place, row in enumerate(rows) for fitted in self._fitted(row, place)]
+        full = [fitted for place, row in enumerate(rows) for fitted in self._fitted(row, place, numbers)]
         samples = np.array([[self._number(row[index]) for index in numbers] for row in full], dtype=np.float64)
         return samples.reshape(len(full), len(numbers)), [[row[index] for row in full] for index in texts]
 
@@ -164,7 +166,7 @@ class CsvTable:
             raise unreadable(f"The quotes around line {self._line + reader.line_num} do not match.") from None
         return rows
 
-    def _fitted(self, row: list[str], place: int) -> Iterator[list[str]]:
+    def _fitted(self, row: list[str], place: int, numbers: Sequence[int]) -> Iterator[list[str]]:
         """A row as long as the headings, behind the rows of empty cells that it ends; those at the table's end go.
 
         Spreadsheets add empty cells at the end, and rows of nothing else; between samples they are lost samples. Files
@@ -181,7 +183,13 @@ class CsvTable:
                 f"The row in line {self._ends[place]} has {len(row)} cells where the headings have {width}."
             )
         if [cell.strip() for cell in row[:width]] == self._repeated:
+            self._joined = True
             return
+        if len(numbers) > 2 and all(_is_word(row[index]) for index in numbers):
+            raise unreadable(
+                f"Line {self._ends[place]} holds words in every column of numbers: they are no units that are known, and "
+                "another table is a file of its own."
+            )
         yield from ([""] * width for _ in range(self._empty_rows))
         self._begun, self._empty_rows = True, 0
         yield row[:width]
@@ -208,6 +216,11 @@ class CsvTable:
         if self._delimiter != ",":
             raise unreadable(detail)
         return float("inf")
+
+
+def _is_word(cell: str) -> bool:
+    """Whether a cell holds something, and no number however that is written."""
+    return not (is_no_number(cell) or _NUMBER.fullmatch(cell) or _DECIMAL_COMMA.fullmatch(cell))
 
 
 def _lines(stream: BinaryIO, encoding: str) -> Iterator[str]:

@@ -17,13 +17,15 @@ class Columns:
     """Rows of a table, the columns by their index; a cell that is no number is NaN.
 
     Where the format itself parts impacts, `lengths` says how many rows each of them has, a block holds whole impacts,
-    and `texts` have one cell an impact; else they have one cell a row.
+    and `texts` have one cell an impact; else they have one cell a row. `joined` says that the headings stood again
+    among these rows, as where files were joined.
     """
 
     rows: int
     numbers: dict[int, FloatArray]
     texts: Mapping[int, Sequence[str]]
     lengths: list[int] | None = None
+    joined: bool = False
 
 
 class Table(Protocol):

@@ -35,7 +35,7 @@ from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.row_labels import RowLabels
-from headimpact_service.ingest.stamps import agree, before_zero_ms, follows
+from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows
 from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
@@ -276,6 +276,13 @@ class TableImpact:
         """
         asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
         said = self.options.sample_rate_hz or reading.sample_rate_hz
+        if said and reading.sample_rate_hz and abs(said - reading.sample_rate_hz) > DRIFT * said:
+            raise label_fault(
+                f"The impact's row says {reading.sample_rate_hz:g} samples per second, and {said:g} were given beside "
+                "the file: leave out the rate that is wrong.",
+                "rate-differs",
+                parameter="sample_rate_hz",
+            )
         if said is None and signal.sample_rate_hz is not None and signal.clock is None:
             return signal.sample_rate_hz
         rate = said or signal.sample_rate_hz or asked

@@ -31,15 +31,15 @@ _MEASURED = frozenset(
     }
 )
 """Words of what changes within an impact, whatever it is of: a sensor's temperature, an event's flag."""
-_TIMES = frozenset({"time", "date", "timestamp", "datetime", "clock"})
+_TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
-_TIME_OF_DAY = re.compile(r"[0-2]?[0-9]:[0-5][0-9]:[0-5][0-9](\.[0-9]{1,9})?")
-_WHOLE = re.compile(r"[+-]?[0-9]{1,15}(\.0*)?")
+_CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
+_NUMBER = re.compile(r"[+-]?([0-9]+[.,]?[0-9]*|[.,][0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 _WITH_PARTS = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
 ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
 STAY = 10
-"""A time that cannot be read and stays for so many rows on average is none of the samples'."""
+"""What is no time and stays for so many rows on average is none of the samples'."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,25 +76,47 @@ def unread_columns(headings: Sequence[str], read: Collection[int]) -> Unread:
 
 
 def begins_anew(cells: Sequence[str]) -> bool:
-    """Whether numbers of samples go back to one that was before."""
-    told = [float(cell) for cell in map(said, cells) if _WHOLE.fullmatch(cell)]
+    """Whether numbers of samples stand still or go back to one that was before."""
+    told = _numbers(cells)
     return any(after <= before for before, after in pairwise(told)) and len(set(told)) > 1
+
+
+def _numbers(cells: Sequence[str]) -> list[float]:
+    return [float(cell.replace(",", ".")) for cell in map(said, cells) if _NUMBER.fullmatch(cell)]
 
 
 def are_several(cells: Sequence[str]) -> bool:
     """Whether a column names more than one thing: not one that is measured, nor one that numbers its rows."""
-    told = [cell for cell in map(said, cells) if cell]
-    distinct = set(told)
-    return 1 < len(distinct) < len(told) and not any(map(_WITH_PARTS.fullmatch, distinct))
+    distinct = set(filter(None, map(said, cells)))
+    return 1 < len(distinct) < len(cells) and not any(map(_WITH_PARTS.fullmatch, distinct))
 
 
 def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:
     """Whether times are further apart than the samples of one impact are."""
-    told = dict.fromkeys(filter(None, map(said, cells)))
+    told = list(dict.fromkeys(filter(None, map(said, cells))))
+    if len(told) < 2:
+        return False
+    most = len(cells) / MIN_RATE_HZ + ROUNDED_TO_S
+    if all(map(_NUMBER.fullmatch, told)):
+        stamps = _numbers(cells)
+        fall = any(after < before for before, after in pairwise(stamps))
+        return fall or (len(told) * STAY <= len(cells) and stamps[-1] - stamps[0] > most)
     moments = [when for text in told if (when := moment_of(text, time_zone)) is not None]
-    if len(moments) < len(told):
-        return len(told) > 2 and len(told) * STAY <= len(cells)
-    return bool(moments) and span_s(moments) > len(cells) / MIN_RATE_HZ + ROUNDED_TO_S
+    if len(moments) == len(told):
+        return span_s(moments) > most
+    clocks = [_CLOCK.search(text) for text in told]
+    read = [clock for clock in clocks if clock is not None]
+    if len(read) == len(told):
+        days = {text.replace(clock[0], "") for text, clock in zip(told, read, strict=True)}
+        seconds = [_seconds(clock) for clock in read]
+        return len(days) > 1 or max(seconds) - min(seconds) > most
+    return len(told) * STAY <= len(cells)
+
+
+def _seconds(clock: re.Match[str]) -> float:
+    """A time of day, or what of it a spreadsheet left: minutes and seconds."""
+    hours, minutes, seconds = clock.groups()
+    return 3600.0 * float(hours or 0) + 60.0 * float(minutes) + float(seconds.replace(",", "."))
 
 
 def span_s(moments: Sequence[datetime]) -> float:
@@ -103,9 +125,8 @@ def span_s(moments: Sequence[datetime]) -> float:
 
 
 def moment_of(text: str, time_zone: str | None) -> datetime | None:
-    """A date with its time, in any zone, or a time of any day; None for anything else."""
-    whole = f"2000-01-01T{text.zfill(8)}" if _TIME_OF_DAY.fullmatch(text) else text.replace("/", "-")
+    """A date with its time, in any zone; None for anything else."""
     try:
-        return instant(whole, time_zone or "UTC")
+        return instant(text.replace("/", "-"), time_zone or "UTC")
     except TimeError:
         return None

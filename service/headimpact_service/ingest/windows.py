@@ -8,7 +8,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from headimpact_service.errors import Problem
+from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.cells import Stacked, said
 from headimpact_service.ingest.table import Columns
 
@@ -66,6 +66,11 @@ def _single(blocks: Iterable[Columns], max_rows: int) -> Iterator[Window]:
     for block in blocks:
         held.append(block)
         count += block.rows
+        if block.joined:
+            raise several(
+                "The headings stand again among the samples: if files of several impacts were joined, tell them apart "
+                "by a column impact_id or a mapping's group_by."
+            )
         if count > max_rows:
             raise _unreadable(f"An impact may have at most {max_rows} samples; a mapping's group_by parts a file.")
     if count:
@@ -190,6 +195,11 @@ def _counted(first: int, rows: int) -> int:
     if first + rows > MAX_ROWS:
         raise _unreadable(f"A file may have at most {MAX_ROWS} rows.")
     return first + rows
+
+
+def several(detail: str) -> Problem:
+    """The 422 for rows that are several impacts and do not say which is whose."""
+    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code="several-impacts")])
 
 
 def _unreadable(detail: str) -> Problem:

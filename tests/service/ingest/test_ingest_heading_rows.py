@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from ingest_files import GENERIC, codes, csv_text, one, refused, six_axis
+from ingest_files import GENERIC, codes, csv_text, one, read, refused, six_axis
 
 from headimpact.preparation import prepare
 from headimpact_service.ingest.mapping import Mapping
@@ -47,7 +47,7 @@ class TestTop:
 
     def test_units_that_are_not_known_are_no_row_of_units(self):
         problem = refused(with_rows(GENERIC, "V,V,V,V,V,V,V"))
-        assert codes(problem) == [(None, "missing-sample")]
+        assert "Line 2 holds words in every column of numbers" in problem.detail
 
     def test_a_mapping_names_the_headings_above_a_row_of_units(self):
         columns = {"unit": "g", "x": "Accel X", "y": "Accel Y", "z": "-Accel Z"}
@@ -84,14 +84,22 @@ class TestTop:
         lines[5] += ",1"
         assert "in line 11 has 9 cells" in refused("\n".join(lines)).detail
 
-    @pytest.mark.parametrize("key", ["", "impact_id,"])
-    def test_headings_that_stand_again_where_files_were_joined_are_passed_over(self, key):
-        cell = "1," if key else ""
-        heading, *lines = [
-            f"{key if not number else cell}{line}" for number, line in enumerate(csv_text().splitlines())
-        ]
-        record = one("\n".join([heading, *lines[:20], heading, *lines[20:]]))
-        assert np.array_equal(samples_of(record), samples_of(one(csv_text())))
+    def test_headings_that_stand_again_where_files_were_joined_are_passed_over(self):
+        first, *rest = csv_text().splitlines()
+        heading, lines = f"impact_id,{first}", [f"{number // 20},{line}" for number, line in enumerate(rest)]
+        text = "\n".join([heading, *lines[:20], heading, *lines[20:]])
+        assert [len(samples_of(record)) for record in read(text)] == [20, 20]
+
+    def test_headings_that_stand_again_where_nothing_tells_impacts_apart_are_refused(self):
+        lines = [line.partition(",")[2] for line in csv_text().splitlines()]
+        problem = refused("\n".join([*lines, *lines]), sample_rate_hz=1000.0)
+        assert codes(problem) == [(None, "several-impacts")]
+
+    @pytest.mark.parametrize("other", ["t_s,ay_g,ax_g,az_g,wx_rad_s,wy_rad_s,wz_rad_s", "t,a,b,c,d,e,f"])
+    def test_other_headings_among_the_samples_end_the_file(self, other):
+        lines = csv_text(before={"impact_id": "1"}).splitlines()
+        more = csv_text(before={"impact_id": "2"}).splitlines()[1:]
+        assert "Line 42 holds words" in refused("\n".join([*lines, f"impact_id,{other}", *more])).detail
 
     def test_a_first_row_of_cells_that_hold_nothing_is_no_heading(self):
         lines = csv_text().splitlines()

@@ -70,6 +70,8 @@ class TestReading:
             labelled(filter="none", sample_rate_hz=1000.2), sample_rate_hz=1000.4
         ).recording.signals()
         assert signal.sample_rate_hz == 1000.4
+        problem = refused(labelled(sample_rate_hz=1000).replace("t_s", "x"), sample_rate_hz=2000.0)
+        assert codes(problem) == [("sample_rate_hz", "rate-differs")]
         assert one(labelled(axes="", filter="", mounting="")).recording.axes == "anatomical"
 
     @pytest.mark.parametrize(
