@@ -187,8 +187,8 @@ class CsvTable:
             return
         if len(numbers) > 2 and all(_is_word(row[index]) for index in numbers):
             raise unreadable(
-                f"Line {self._ends[place]} holds words in every column of numbers: they are no units that are known, and "
-                "another table is a file of its own."
+                f"Line {self._ends[place]} holds words in every column of numbers: they are no units that are known, "
+                "and another table is a file of its own."
             )
         yield from ([""] * width for _ in range(self._empty_rows))
         self._begun, self._empty_rows = True, 0

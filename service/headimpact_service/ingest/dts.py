@@ -134,6 +134,12 @@ class _Data:
             raise Problem("unreadable-file", f"A file may have 1 to {MAX_CHANNELS} channels.")
         self.rows = [without_empty_end(row) for row in rows]
         self.first = self._first_column()
+        headings = [cell for cell in header.headings if cell in codes]
+        if sorted(headings) == sorted(filter(None, codes)) and headings != list(filter(None, codes)):
+            raise curve_fault(
+                "The headings above the samples stand in another order than the channels' codes: which is right?",
+                "heading-order",
+            )
         rate = header.rate_hz
         if rate is None or rate <= 0.0:
             raise curve_fault("The header gives no sample rate.", "rate-missing")

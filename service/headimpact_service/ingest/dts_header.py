@@ -39,11 +39,15 @@ A_NUMBER = re.compile(NUMBER, re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """Cells by what they say; `before_s` is what one unit of the record before the trigger is [s], None for points."""
+    """Cells by what they say, and the headings right above the samples.
+
+    `before_s` is what one unit of the record before the trigger is [s], None for points.
+    """
 
     fields: dict[str, list[str]]
     metadata: dict[str, str]
     before_s: float | None
+    headings: Sequence[str] = ()
 
     def of_channel(self, key: str, index: int) -> str:
         """The channel's cell; a row with a single cell speaks for all channels."""
@@ -95,7 +99,7 @@ def read_header(rows: Sequence[Sequence[str]]) -> tuple[Header, int]:
     before_s: float | None = None
     for number, row in enumerate(rows[:MAX_HEADER_ROWS]):
         if A_NUMBER.fullmatch(row[0] or next(filter(None, row))) is not None:
-            return Header(fields, metadata, before_s), number
+            return Header(fields, metadata, before_s, rows[number - 1] if number else ()), number
         name = key_of(row[0])
         if name == "before" and name not in fields:
             before_s = _SECONDS.get(_unit_before(row[0]) or "")

@@ -152,7 +152,10 @@ class _Test:
 
     def _stamps(self, header: Header, count: int, named: str) -> tuple[FloatArray, float | None]:
         """The channel's times [s] and their rate: implicit in its header, or those of the channel that it refers to."""
-        step, told = self._step(header), header.number("time of first sample")
+        for key in ("sampling interval", "time of first sample"):
+            if header.text(key) is not None and header.number(key) is None:
+                raise curve_fault(f"The {key} of {named} is no number of seconds.", "time-form")
+        step, told = self._step(header, named), header.number("time of first sample")
         explicit = (header.text("reference channel") or "").casefold() == "explicit"
         if explicit or step is None or (told is None and self._refers(header)):
             stamps = self._reference(header, count, named)
@@ -162,10 +165,12 @@ class _Test:
             raise curve_fault(f"The times of {named} must increase.", "time-not-increasing")
         return stamps, nominal_rate(stamps)
 
-    def _step(self, header: Header) -> float | None:
+    def _step(self, header: Header, named: str) -> float | None:
         """The sampling interval that the header says or, where it says none, the sender [s]."""
         step = header.number("sampling interval")
-        if step is not None and 0.0 < step < 1.0:
+        if step is not None and not (step == 0.0 and self._refers(header)):
+            if not 0.0 < step < 1.0:
+                raise curve_fault(f"The sampling interval of {named} is {step:g}: it is one in seconds.", "time-form")
             return step
         return None if self.options.sample_rate_hz is None else 1.0 / self.options.sample_rate_hz
 

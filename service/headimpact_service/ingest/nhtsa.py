@@ -21,7 +21,7 @@ from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
-from headimpact_service.ingest.stamps import nominal_rate
+from headimpact_service.ingest.stamps import DRIFT, nominal_rate
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
 
@@ -131,9 +131,24 @@ class _Head:
         rate = nominal_rate(stamps)
         if rate is None:
             raise curve_fault(f"The times of {channel.named} must increase in equal steps.", "time-not-increasing")
+        self._compare_times(channel, float(stamps[0]), rate)
         if channel.unit is None:
             raise curve_fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
         return Curve(channel.axis, channel.unit, values, stamps, rate, channel.full_scale)
+
+    def _compare_times(self, channel: Channel, first_s: float, rate: float) -> None:
+        """What the EV5 says of a curve's step and begin, against the curve's own times, which count."""
+        if channel.step_us is None:
+            return
+        said = channel.step_us * 1e-6
+        begins = None if channel.first is None else channel.first * said
+        if abs(said * rate - 1.0) > DRIFT:
+            what = f"a step of {channel.step_us:g} us where the curve's times step by {1e6 / rate:g} us"
+        elif begins is not None and abs(begins - first_s) * rate > 1.0:
+            what = f"a begin at {1e3 * begins:g} ms where the curve's times begin at {1e3 * first_s:g} ms"
+        else:
+            return
+        self._note("questionable_data", f"The EV5 row of {channel.named} says {what}; the curve's own count.", channel)
 
     def _note(self, code: str, detail: str, channel: Channel) -> None:
         self.notes.append(QualityNote(code, "warning", detail, channel.signal, channel.axis))

@@ -52,6 +52,8 @@ class Channel:
     unit: str | None
     full_scale: float | None
     points: int | None
+    first: int | None
+    step_us: float | None
     status: str
     primary: bool
 
@@ -119,6 +121,8 @@ def _channel(row: list[str]) -> Channel | None:
         unit=_UNITS[signal].get(row[7].upper()),
         full_scale=_positive(row[11]),
         points=None if first is None or last is None else last - first + 1,
+        first=first,
+        step_us=_positive(row[16]),
         status=row[17].upper(),
         primary=row[18].upper() == "P",
     )

@@ -141,9 +141,8 @@ def _require_rate(layout: Layout, plan: Plan) -> None:
 
 _TIMES_OR_RATES = frozenset(
     {
-        *("t", "time", "times", "timestamp", "timestamps", "tms", "ts", "timems", "times", "timesec", "tsec"),
-        *("fs", "rate", "samplerate", "samplingrate", "sampleratehz", "samplingratehz", "samplingfrequency"),
-        *("samplefrequency", "frequency", "freq", "hz", "dt", "samplinginterval", "sampleinterval"),
+        *("t", "time", "times", "timestamp", "timestamps", "tms", "ts", "timems", "timesec", "tsec"),
+        *("rate", "samplefrequency", "frequency", "freq", "hz", "dt", "samplinginterval", "sampleinterval"),
     }
 )
 """Names of times and rates, as :func:`compact` has them."""

@@ -299,3 +299,11 @@ class TestKeys:
         assert record.recording.linear_acceleration.unit == "g"
         wrong = Mapping.model_validate({"linear_acceleration": named | {"unit": "m/s^2"}})
         assert codes(refused(uncoded, preset="dts", mapping=wrong))[0][1] == "units-differ"
+
+
+def test_headings_in_another_order_than_the_codes_are_refused():
+    text = dts()
+    headings = ",".join(["Time (sec)", *DTS_COLUMNS])
+    turned = ",".join(["Time (sec)", *reversed(DTS_COLUMNS)])
+    assert headings in text
+    assert codes(refused(text.replace(headings, turned))) == [(None, "heading-order")]

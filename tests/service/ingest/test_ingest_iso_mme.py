@@ -351,6 +351,12 @@ class TestWhichTimes:
         held = channels() | {AX: channel(AX, "g", half_sine(SAMPLES).tolist(), time_of_first_sample=None)}
         assert codes(refused(iso_mme(held))) == [(None, "time-missing")]
 
+    @pytest.mark.parametrize(
+        "change", [{"time_of_first_sample": "-10 ms"}, {"sampling_interval": "0,001"}, {"sampling_interval": 1000}]
+    )
+    def test_a_time_that_cannot_be_read_is_refused(self, change):
+        assert codes(refused(iso_mme(channels(**change)))) == [(None, "time-form")]
+
     def test_the_sender_may_give_the_rate_that_the_headers_do_not(self):
         held = channels(sampling_interval=None)
         assert codes(refused(iso_mme(held))) == [(None, "time-missing")]

@@ -213,9 +213,8 @@ class TestRates:
             {"t": T_2KHZ},
             {"t": T_2KHZ[:, None] * 1000.0},
             {"time": np.tile(T_2KHZ, (3, 1))},
-            {"fs": 2000.0},
-            {"Fs": np.full((3, 1), 2000.0)},
-            {"sampling_rate": 2000.0},
+            {"rate": 2000.0},
+            {"dt": np.full((3, 1), 0.0005)},
         ],
     )
     def test_one_that_is_not_read_is_not_passed_over(self, beside: dict[str, Any]):
@@ -231,6 +230,9 @@ class TestRates:
             {"time_s": np.tile(T_2KHZ, (3, 1))},
             {"sample_rate_hz": 2000.0},
             {"sample_rate_hz": np.full((1, 3), 2000.0)},
+            {"fs": 2000.0},
+            {"Fs": np.full((3, 1), 2000.0)},
+            {"sampling_rate": 2000.0},
         ],
     )
     def test_one_that_names_its_unit_is_read(self, beside: dict[str, Any]):
@@ -243,10 +245,22 @@ class TestRates:
         assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {1000.0}
         assert {record.recording.pre_trigger_ms for record in found} == {10.0}
 
-    def test_a_struct_without_its_times_does_not_hide_its_rate(self):
-        [values] = noise(1, 100)
-        struct = structs({"lin_acc_CG": values[:, :3], "ang_vel": values[:, 3:], "fs": 2000.0})
-        assert codes(refused(mat({"impact": struct}), preset=PRESET)) == [("sample_rate_hz", "rate-unclear")]
+    def test_a_rate_stands_in_a_struct_beside_it_or_in_the_one_around_it(self):
+        values = noise(2, 100)
+        both = [{"lin_acc_CG": sent[:, :3], "ang_vel": sent[:, 3:]} for sent in values]
+        files = (
+            {"impact": structs(*(one | {"fs": 2000.0} for one in both))},
+            {"impact": structs(*both), "fs": 2000.0},
+            {"session": {"impact": structs(*both), "fs": 2000.0, "player": "p-1"}},
+        )
+        for variables in files:
+            found = records(mat(variables), preset=PRESET)
+            assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {2000.0}
+
+    def test_a_rate_that_the_times_or_the_sender_contradict_is_refused(self):
+        for variables in ({"impact": impacts(noise(1, 100)), "fs": 2000.0}, {"hits": noise(1, 100), "fs": 1000.0}):
+            [problem] = read(mat(variables), preset=PRESET, sample_rate_hz=None if "impact" in variables else 2000.0)
+            assert codes(problem) == [("sample_rate_hz", "rate-differs")]
 
 
 class TestOtherShapes:

@@ -298,3 +298,20 @@ def test_any_header_and_curve_are_read_or_refused(header: str, whole: bool, text
     items = outcome(zipped({**files(""), **content}))
     assert items
     assert statuses(items) <= {422}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"|100|AM": "|80|AM"}, "a step of 80 us where the curve's times step by 100 us"),
+        ({"|-10|29|": "|0|39|"}, "a begin at 0 ms where the curve's times begin at -1 ms"),
+    ],
+)
+def test_times_that_the_header_says_otherwise_are_noted_and_the_curves_own_count(change, said):
+    header = ev5(*rows())
+    for before, after in change.items():
+        header = header.replace(before, after)
+    record = one(zipped(files(header=header)))
+    assert record.recording.pre_trigger_ms == 1.0
+    assert {note.code for note in record.notes} == {"questionable_data"}
+    assert all(said in note.detail for note in record.notes)

@@ -162,3 +162,17 @@ def test_a_workbook_that_cannot_be_read_says_why(data: bytes, said: str):
     problem = refused(data)
     assert problem.slug == "unreadable-file"
     assert said in problem.detail
+
+
+def test_a_sheet_whose_numbers_are_all_text_is_read():
+    headings, *rows = generic()
+    [record] = records(xlsx({"a": [headings, *([repr(cell) for cell in row] for row in rows)]}))
+    np.testing.assert_array_equal(samples_of(record), six_axis())
+
+
+def test_a_row_of_units_below_the_headings_is_one():
+    _, *rows = generic()
+    words = ["Time", "Accel X", "Accel Y", "Accel Z", "Gyro X", "Gyro Y", "Gyro Z"]
+    units = ["s", "g", "g", "g", "rad/s", "rad/s", "rad/s"]
+    [record] = records(xlsx({"a": [["Event 1"], words, units, *rows]}))
+    np.testing.assert_array_equal(samples_of(record), six_axis())

@@ -47,8 +47,10 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
     structs = [value for value in variables.values() if _is_struct(value)]
     cells = {name: value for name, value in variables.items() if _is_cells(value)}
     if structs:
+        shared = _facts(variables)
         for struct in structs:
-            yield NamedTable(None, _table_of([_flat(element) for element in _elements(struct)]))
+            elements, within = _elements(struct)
+            yield NamedTable(None, _table_of([shared | within | _flat(element) for element in elements]))
     elif cells:
         for name, value in cells.items():
             yield NamedTable(None, _table_of([_of_cell(name, cell) for cell in value.reshape(-1)]))
@@ -170,10 +172,25 @@ def _shared(name: str, value: AnyArray, impacts: int, length: int) -> AnyArray |
     return np.broadcast_to(value.reshape(1, -1, 1), (impacts, length, 1))
 
 
-def _elements(struct: AnyArray) -> AnyArray:
-    """The impacts of a struct array, which may be the only one of many elements within a struct of a session."""
+def _facts(fields: dict[str, Any]) -> dict[str, Any]:
+    """What is said once for all impacts beside them: lone numbers and texts."""
+    return {name: value for name, value in fields.items() if isinstance(value, np.ndarray) and _is_fact(value)}
+
+
+def _is_fact(value: AnyArray) -> bool:
+    return value.size == 1 and value.dtype.kind in "USfiu"
+
+
+def _elements(struct: AnyArray) -> tuple[AnyArray, dict[str, Any]]:
+    """The impacts of a struct array, which may be the only one of many elements within a session's struct.
+
+    With them what that struct says once for all of them.
+    """
     many = _of_many(struct)
-    return (many[0] if len(many) == 1 else struct).reshape(-1)
+    if len(many) != 1 or many[0] is struct:
+        return struct.reshape(-1), {}
+    session = struct.reshape(-1)[0]
+    return many[0].reshape(-1), _facts({name: session[name] for name in session.dtype.names})
 
 
 def _of_many(struct: AnyArray, depth: int = 0) -> list[AnyArray]:

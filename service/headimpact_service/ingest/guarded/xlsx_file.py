@@ -145,7 +145,7 @@ def _blocks(sheet: CalamineSheet) -> list[_Block]:
             continue
         if _has_number(row):
             block = _begun(above, before)
-            if block is not None and sum(_is_number(row[column]) for column in block.columns) > 1:
+            if block is not None and sum(_says_number(row[column]) for column in block.columns) > 1:
                 blocks.append(block)
                 empty = []
             if blocks:
@@ -183,7 +183,12 @@ def _named_columns(row: Row) -> list[int]:
 
 
 def _has_number(row: Row) -> bool:
-    return any(map(_is_number, row))
+    """Whether a row holds a number, or more than one that is kept as text."""
+    return any(map(_is_number, row)) or sum(map(_says_number, row)) > 1
+
+
+def _says_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
+    return _is_number(cell) or (isinstance(cell, str) and _NUMBER.fullmatch(cell) is not None)
 
 
 def _is_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
