@@ -76,7 +76,7 @@ class Gate:
         sent = authorization or ""
         until, caller = self.remembered.get(sent, (0.0, None))
         if caller is None or time.monotonic() > until:
-            caller = await self._look_up(sent)
+            caller = await self.look_up(sent)
         if self.rate_limit is not None:
             self._count(caller.key.id, self.rate_limit)
         return caller
@@ -85,7 +85,8 @@ class Gate:
         """Look every key up again: one was revoked, settings changed, or another model is active."""
         self.remembered.clear()
 
-    async def _look_up(self, authorization: str) -> Caller:
+    async def look_up(self, authorization: str) -> Caller:
+        """The caller as the database knows it now, whatever is remembered."""
         self.remembered.pop(authorization, None)
         scheme, _, key = authorization.partition(" ")
         if scheme.lower() != "bearer" or not key.strip():
@@ -132,6 +133,12 @@ async def authorize(request: Request, access: str) -> Caller:
     if access != ANY and access not in caller.key.scopes:
         raise scope_missing(access)
     return caller
+
+
+async def renewed(request: Request) -> Caller:
+    """The caller of a request that was authorised, with the organisation's terms as they are stored now."""
+    gate: Gate = request.app.state.gate
+    return await gate.look_up(request.headers.get("authorization") or "")
 
 
 def scope_missing(scope: str) -> Problem:

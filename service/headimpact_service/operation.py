@@ -8,7 +8,7 @@ would read a body before it looks at a key, is replaced where FastAPI provides f
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pydantic import BaseModel
@@ -81,6 +81,10 @@ class Call:
         if self.caller is None:
             raise LookupError("A public operation has no caller.")
         return self.caller
+
+    async def renewed(self) -> Call:
+        """The same request, with the terms of its organisation as they are stored now."""
+        return replace(self, caller=await deps.renewed(self.request))
 
     def path(self, name: str) -> str:
         """A part of the path."""

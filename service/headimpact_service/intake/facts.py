@@ -62,6 +62,7 @@ def _device(device: devices.Device | None) -> DeviceFacts:
         mounting=None if sent is None else mounting(sent),
         linear_acceleration_range_g=device.linear_acceleration_range_g,
         angular_velocity_range_rad_s=device.angular_velocity_range_rad_s,
+        revision=device.revision,
     )
 
 

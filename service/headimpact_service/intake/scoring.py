@@ -69,6 +69,8 @@ class DeviceFacts:
     mounting: Mounting | None = None
     linear_acceleration_range_g: float | None = None
     angular_velocity_range_rad_s: float | None = None
+    revision: int | None = None
+    """Of the page; None where there is none."""
 
 
 @dataclass(frozen=True, slots=True)

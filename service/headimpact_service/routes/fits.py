@@ -64,7 +64,7 @@ async def order_fit(call: Call) -> Response:
         taken = await deps.read(call.request, lambda conn: models.get(conn, call.data_set_id, body.version or ""))
         if taken is not None:
             raise Problem("conflict", "There is a model of this version, and versions do not change.")
-    return accepted(await _order(call, "fit", {"fit": stored(body, call.terms)}))
+    return accepted(await _order(call, "fit", {"fit": stored(body, (await call.renewed()).terms)}))
 
 
 @routes(
@@ -86,11 +86,12 @@ async def order_rescore(call: Call) -> Response:
     body: RescoreBody = call.body
     version = call.path("version")
     model = await deps.read(call.request, lambda conn: registry.model_of(conn, call.data_set_id, version))
+    key = (await call.renewed()).key
     arguments = {
         "version": model.version,
         "cohort": body.cohort.model_dump(mode="json", exclude_none=True),
         "make_current": body.make_current,
-        "terms": {"incidence": call.key.incidence, "operating_points": list(call.key.operating_points)},
+        "terms": {"incidence": key.incidence, "operating_points": list(key.operating_points)},
         "chunk": CHUNK,
     }
     return accepted(await _order(call, "rescore", arguments))

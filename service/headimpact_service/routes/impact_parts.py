@@ -213,9 +213,10 @@ async def _terms(call: Call, body: NewScoreBody) -> Terms:
         detail = "There is no model with this version; GET /v1/models lists them."
         error = PayloadError(detail=detail, code="unknown-model", pointer="/model")
         raise Problem("invalid-payload", detail, errors=[error]) from None
+    present_terms = (await call.renewed()).terms
     asked = body.operating_points
-    points = call.terms.operating_points if asked is None else requests_of(asked)
-    terms = Terms(incidence=call.terms.incidence, operating_points=points, model=model)
+    points = present_terms.operating_points if asked is None else requests_of(asked)
+    terms = Terms(incidence=present_terms.incidence, operating_points=points, model=model)
     if asked is not None:
         operating_points(points, terms)  # one that was asked for is refused where the model lacks it
     return terms

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 from starlette.responses import Response
@@ -36,10 +38,13 @@ from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
 from headimpact_service.routes.scoring import RECORD_PROBLEMS, score
 from headimpact_service.routes.trace_export import trace_form, with_samples
 from headimpact_service.store import impacts
-from headimpact_service.store.impacts import Impact, ImpactFilters, NewImpact
+from headimpact_service.store.impact_rows import NewImpact, Outcome, ScoreOutdated
+from headimpact_service.store.impacts import Impact, ImpactFilters
 
 routes = Routes("impacts")
 
+TRIES = 4
+"""How often an impact is scored before it is answered that what it depends on keeps changing."""
 ETAG = {"ETag": "The revision, for If-Match."}
 LOCATION = {"Location": "The impact's address."}
 Text = Annotated[str | None, Field(min_length=1, max_length=200)]
@@ -60,18 +65,35 @@ Text = Annotated[str | None, Field(min_length=1, max_length=200)]
 )
 async def create_impact(call: Call) -> Response:
     """Committed before the answer. With an `external_id` it is safe to send again: 200 for the same content."""
-    record = to_record(call.body)
-    scored, new = await _scored(call, record)
-    outcome = await deps.write(call.request, lambda conn: impacts.add(conn, call.data_set_id, new))
+    outcome, scored = await _stored(call, lambda new, conn: impacts.add(conn, call.data_set_id, new))
     if outcome.status == "created":
         return _answer(call, outcome.impact, 201, scored)
     return _answer(call, outcome.impact, 200, scored, redelivered=True)
 
 
+async def _stored(call: Call, change: Callable[[NewImpact, Any], Outcome]) -> tuple[Outcome, Scored]:
+    """What became of the impact in the body, and its score.
+
+    What a score depends on is remembered for a moment, in which another process may change it: then it is made anew.
+    """
+    record = to_record(call.body)
+    tries = 0
+    while True:
+        scored, new = await _scored(call, record)
+        try:
+            return await deps.write(call.request, partial(change, new)), scored
+        except ScoreOutdated:
+            tries += 1
+            if tries == TRIES:
+                raise
+        call.request.app.state.facts.forget_those_of(call, record)
+        call = await call.renewed()
+
+
 async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
     """The record's score, and the rows of both."""
-    scored = await score(call, record)
-    return scored, new_impact(scored, content_digest(record, scored.sent_digest), call.key.id)
+    scored, seen = await score(call, record)
+    return scored, replace(new_impact(scored, content_digest(record, scored.sent_digest), call.key.id), seen=seen)
 
 
 def _answer(call: Call, impact: Impact, status: int, scored: Scored, *, redelivered: bool = False) -> Response:
@@ -222,9 +244,8 @@ async def correct_impact(call: Call) -> Response:
     """
     impact_id, revision = identifier(call), if_match(call.request, required=True)
     await present(call)
-    scored, new = await _scored(call, to_record(call.body))
-    outcome = await deps.write(
-        call.request, lambda conn: impacts.correct(conn, call.data_set_id, impact_id, new, if_match=revision)
+    outcome, scored = await _stored(
+        call, lambda new, conn: impacts.correct(conn, call.data_set_id, impact_id, new, if_match=revision)
     )
     return _answer(call, outcome.impact, 200, scored, redelivered=outcome.status == "unchanged")
 

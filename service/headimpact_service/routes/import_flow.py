@@ -16,9 +16,10 @@ PER_TRANSACTION = 100
 
 
 async def score_all(call: Call, found: Found) -> list[Item]:
-    """Every impact scored, or its problem, in the file's order."""
+    """Every impact scored, or its problem, in the file's order, under the terms that are stored now."""
+    terms = (await call.renewed()).terms
     known = await deps.read(call.request, lambda conn: look_up(conn, call.data_set_id, found))
-    return await run_sync(partial(score_found, found, known, call.terms))
+    return await run_sync(partial(score_found, found, known, terms))
 
 
 async def store_all(call: Call, items: list[Item]) -> list[dict[str, Any]]:

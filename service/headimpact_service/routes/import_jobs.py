@@ -44,7 +44,7 @@ async def order_import(call: Call, upload: Upload, sent: Mapping[str, str], *, d
     key = idempotency_key(call.request)
     new = NewJob(
         kind="import",
-        arguments=_arguments(call, upload, sent),
+        arguments=_arguments(await call.renewed(), upload, sent),
         key_id=call.key.id,
         idempotency_key=key,
         request_hash=None if key is None else await run_sync(partial(_request_hash, upload, sent)),

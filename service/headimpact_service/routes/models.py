@@ -183,7 +183,7 @@ async def read_alias(call: Call) -> Response:
     problems=("not-found", "conflict", "operating-point-unreachable", "precondition-failed", "precondition-required"),
 )
 async def change_alias(call: Call) -> Response:
-    """Promotion and rollback are the same call. New scores follow at once, in other processes within five seconds.
+    """Promotion and rollback are the same call. Scores that are stored follow at once, in every process.
 
     Stored scores keep the model that made them. A model that lacks an operating point which the organisation has set
     is not promoted: alerts would be missing in silence.
@@ -193,11 +193,13 @@ async def change_alias(call: Call) -> Response:
     if name == "active" and body.version is None:
         raise Problem("conflict", "Some model is always active: name one, as the published laksari-2020.")
 
+    key = (await call.renewed()).key
+
     def change(conn: Any) -> list[Alias]:  # noqa: ANN401 - a connection of the store
         if body.version is not None:
             model = registry.model_of(conn, call.data_set_id, body.version)
             if name == "active":
-                registry.require_promotable(model, call.key.incidence, call.key.operating_points)
+                registry.require_promotable(model, key.incidence, key.operating_points)
         aliases.put(conn, call.data_set_id, name, body.version, body.reason, call.key.id, if_match=revision)
         return aliases.history(conn, call.data_set_id, name)
 

@@ -10,9 +10,30 @@ from typing import Any, Literal
 
 from sqlalchemy import and_, bindparam, select
 
+from headimpact_service.errors import Problem
 from headimpact_service.store import score_rows
 from headimpact_service.store.score_rows import NewScore, Score
 from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts, labels, scores
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a score was made under beside the record, by its revisions; None for what was not known."""
+
+    settings: int | None
+    model: str | None
+    athlete: int | None
+    device: int | None
+
+
+class ScoreOutdated(Problem):
+    """The 503 for an impact whose score was made under what is no longer so: it has to be scored anew."""
+
+    def __init__(self) -> None:
+        """Nothing was written."""
+        super().__init__(
+            "unavailable", "What the score depends on was changed meanwhile.", headers={"Retry-After": "1"}
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +42,8 @@ class NewImpact:
 
     `document` is everything about the record but its samples; `trace` is what `traces.encode` made of those.
     `content_digest` covers all that the client sent, `input_digest` what the score depends on. The athlete is given
-    by id, or by an external id that is made on first sight; so is the device by its serial.
+    by id, or by an external id that is made on first sight; so is the device by its serial. `seen` is what the score
+    was made under where that came from memory: it is held against what is stored.
     """
 
     content_digest: bytes
@@ -40,6 +62,7 @@ class NewImpact:
     position: str | None = None
     context: Mapping[str, Any] | None = None
     key_id: bytes | None = None
+    seen: Seen | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,17 +6,17 @@ Every function that writes runs inside the writer's transaction, so what it read
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import datetime
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy import BindParameter, Connection, bindparam, select, update
 
-from headimpact_service.errors import PayloadError, Problem, not_found
+from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import athletes as athlete_store
 from headimpact_service.store import devices as device_store
 from headimpact_service.store import erasure, labels
-from headimpact_service.store.clock import last_change, later_than, next_change
+from headimpact_service.store.clock import later_than, next_change
 from headimpact_service.store.impact_inserts import content_members, first_row, insert_revisions, insert_rows
+from headimpact_service.store.impact_known import Known, look_up
 from headimpact_service.store.impact_lists import (
     ImpactFilters,
     Trace,
@@ -28,12 +28,12 @@ from headimpact_service.store.impact_lists import (
     trace,
     traced,
 )
-from headimpact_service.store.impact_rows import Impact, NewImpact, Outcome, Revision, external_id_digest
+from headimpact_service.store.impact_rows import Impact, NewImpact, Outcome, Revision, ScoreOutdated, external_id_digest
 from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.revision import require_revision
 from headimpact_service.store.score_rows import stored
 from headimpact_service.store.scores import next_number
-from headimpact_service.store.tables import athletes, devices, impact_revisions, impacts
+from headimpact_service.store.tables import impact_revisions, impacts
 
 __all__ = [
     "Impact",
@@ -55,55 +55,6 @@ __all__ = [
 ]
 
 _DATA_SET: BindParameter[bytes] = bindparam("data_set_id")
-
-
-class _Known(NamedTuple):
-    """What is stored already that a new impact touches: one query for all of it."""
-
-    last_change: datetime | None
-    athlete_by_name: bytes | None
-    merged_into: bytes | None
-    athlete_by_id: bytes | None
-    athlete_external_id: str | None
-    device: bytes | None
-    same_external_id: bytes | None
-    same_content: bytes | None
-
-    @property
-    def athlete(self) -> bytes | None:
-        """Whose the impact is, if that athlete is known: of one that was merged, into whom."""
-        return self.athlete_by_id or self.merged_into or self.athlete_by_name
-
-
-_ATHLETE_BY_ID = (
-    athletes.c.id == bindparam("athlete_id"),
-    athletes.c.data_set_id == _DATA_SET,
-    athletes.c.deleted_at.is_(None),
-)
-_ATHLETE_BY_NAME = (
-    athletes.c.data_set_id == _DATA_SET,
-    athletes.c.external_id == bindparam("athlete_external_id"),
-)
-_KNOWN = Prepared(
-    select(
-        last_change(impacts),
-        select(athletes.c.id).where(*_ATHLETE_BY_NAME).scalar_subquery(),
-        select(athletes.c.merged_into).where(*_ATHLETE_BY_NAME).scalar_subquery(),
-        select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),
-        select(athletes.c.external_id).where(*_ATHLETE_BY_ID).scalar_subquery(),
-        select(devices.c.id)
-        .where(devices.c.data_set_id == _DATA_SET, devices.c.serial == bindparam("serial"))
-        .scalar_subquery(),
-        select(impacts.c.id)
-        .where(impacts.c.data_set_id == _DATA_SET, impacts.c.external_id_digest == bindparam("external_id_digest"))
-        .scalar_subquery(),
-        select(impacts.c.id)
-        .where(impacts.c.data_set_id == _DATA_SET, impacts.c.input_digest == bindparam("input_digest"))
-        .order_by(impacts.c.id)
-        .limit(1)
-        .scalar_subquery(),
-    )
-)
 _SAME_EVENT = Prepared(
     select(impacts.c.id)
     .where(
@@ -126,36 +77,28 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
 
     A redelivery of an external id with the content of any kept revision is `unchanged`; with other content it is an
     `external-id-conflict` problem, and `impact-deleted` after a deletion. An athlete id that is none of the data set's
-    is a `not-found` problem. With `same_event_is_unchanged` (imports), an impact of the same athlete, instant and input
-    is `unchanged` too, under whatever name that is not taken.
+    is a `not-found` problem, and a score that was made under what has changed since is :class:`ScoreOutdated`. With
+    `same_event_is_unchanged` (imports), an impact of the same athlete, instant and input is `unchanged` too, under
+    whatever name that is not taken.
     """
-    known = _look_up(conn, data_set_id, new)
+    known = look_up(conn, data_set_id, new)
     if known.same_external_id is not None:
         return _redelivery(conn, data_set_id, new, known, known.same_external_id)
     if same_event_is_unchanged and known.same_content is not None:
         same = _same_event(conn, data_set_id, new, known)
         if same is not None:
             return Outcome("unchanged", same)
+    _require_present(new, known)
     return Outcome("created", _insert(conn, data_set_id, new, known))
 
 
-def _look_up(conn: Connection, data_set_id: bytes, new: NewImpact) -> _Known:
-    parameters = {
-        "data_set_id": data_set_id,
-        "athlete_id": new.athlete_id,
-        "athlete_external_id": new.athlete_external_id,
-        "serial": new.device_serial,
-        "external_id_digest": external_id_digest(data_set_id, new.external_id),
-        "input_digest": new.input_digest,
-    }
-    known = _Known(*(_KNOWN.first(conn, parameters) or ()))
-    if new.athlete_id is not None and known.athlete_by_id is None:
-        detail = "There is no athlete with this id."
-        raise Problem("not-found", detail, errors=[PayloadError(detail, "unknown-athlete", pointer="/athlete/id")])
-    return known
+def _require_present(new: NewImpact, known: Known) -> None:
+    """Refuse a score that was made under what has changed since, in this process or in another."""
+    if new.seen is not None and new.seen != known.seen:
+        raise ScoreOutdated
 
 
-def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact | None:
+def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known) -> Impact | None:
     """The stored impact of the same athlete, instant and input."""
     athlete_id = known.athlete
     if athlete_id is None and new.athlete_external_id is not None:
@@ -170,7 +113,7 @@ def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Kn
     return None if found is None else get(conn, data_set_id, found[0])
 
 
-def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known, impact_id: bytes) -> Outcome:
+def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known, impact_id: bytes) -> Outcome:
     """The stored impact of the same external id, if the content is that of one of its revisions."""
     stored_impact = get(conn, data_set_id, impact_id)
     if stored_impact is None:
@@ -182,7 +125,7 @@ def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Kn
     raise Problem("external-id-conflict", "An impact with this external_id exists with other content.")
 
 
-def _is_the_same_by_another_name(new: NewImpact, known: _Known, present: Impact) -> bool:
+def _is_the_same_by_another_name(new: NewImpact, known: Known, present: Impact) -> bool:
     """Whether only the athlete is called otherwise: by our id, or as they are called now."""
     if known.athlete is None or new.document != present.document:
         return False
@@ -192,7 +135,7 @@ def _is_the_same_by_another_name(new: NewImpact, known: _Known, present: Impact)
     )
 
 
-def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> Impact:
+def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known) -> Impact:
     """Three rows: the impact, its first revision with the trace, its score."""
     now = later_than(known.last_change)
     athlete_id, device_id = _athlete_and_device(conn, data_set_id, new, known)
@@ -207,7 +150,7 @@ def _insert(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known)
     )
 
 
-def _athlete_external_id(conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known) -> str | None:
+def _athlete_external_id(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known) -> str | None:
     """What the impact's athlete is called: as it was sent, unless it was sent by our id or that athlete was merged."""
     if new.athlete_id is not None:
         return known.athlete_external_id
@@ -217,7 +160,7 @@ def _athlete_external_id(conn: Connection, data_set_id: bytes, new: NewImpact, k
 
 
 def _athlete_and_device(
-    conn: Connection, data_set_id: bytes, new: NewImpact, known: _Known
+    conn: Connection, data_set_id: bytes, new: NewImpact, known: Known
 ) -> tuple[bytes | None, bytes | None]:
     """Their ids; each is made if it is new."""
     athlete_id = known.athlete
@@ -240,7 +183,8 @@ def correct(
     done once. A name that is another athlete's now is a correction, whatever was sent before.
     """
     present = _require(conn, data_set_id, impact_id)
-    known = _look_up(conn, data_set_id, new)
+    known = look_up(conn, data_set_id, new)
+    _require_present(new, known)
     sent_again = if_match is None or present.revision - if_match in {0, 1}
     if sent_again and _is_already(conn, data_set_id, present, new, known):
         return Outcome("unchanged", present)
@@ -261,7 +205,7 @@ def correct(
     return Outcome("corrected", _require(conn, data_set_id, impact_id))
 
 
-def _is_already(conn: Connection, data_set_id: bytes, present: Impact, new: NewImpact, known: _Known) -> bool:
+def _is_already(conn: Connection, data_set_id: bytes, present: Impact, new: NewImpact, known: Known) -> bool:
     """Whether a correction would leave the impact as it is: content, name, whose it is, and what its device adds."""
     if new.external_id is not None and new.external_id != present.external_id:
         return False
@@ -278,7 +222,7 @@ def _ranges(document: Mapping[str, Any] | None) -> dict[str, float | None]:
     return {name: signal["declared_range"] for name, signal in signals.items()}
 
 
-def _name(data_set_id: bytes, present: Impact, new: NewImpact, known: _Known) -> dict[str, Any]:
+def _name(data_set_id: bytes, present: Impact, new: NewImpact, known: Known) -> dict[str, Any]:
     """The external id after a correction: kept, or given now to an impact that had none."""
     if new.external_id is None or new.external_id == present.external_id:
         return {}

@@ -18,6 +18,7 @@ from sending import Api, impact_body
 
 from headimpact.errors import CalibrationError
 from headimpact.risk import LAKSARI_2020
+from headimpact_service.app import create_app
 from headimpact_service.cli import refit as refit_command
 from headimpact_service.cli.cohort_table import read_cohort
 from headimpact_service.deps import SCOPES
@@ -28,6 +29,7 @@ from headimpact_service.jobs.engine import KINDS
 from headimpact_service.jobs.fit import Fit, _register
 from headimpact_service.jobs.runs import House
 from headimpact_service.routes.fit_shapes import FitBody, stored
+from headimpact_service.settings import Settings
 from headimpact_service.store import ids, job_runs, jobs, keys, labels, schedules
 from headimpact_service.store.database import Database
 from headimpact_service.store.labels import NewLabel
@@ -284,6 +286,15 @@ class TestService:
         assert api.get(f"/v1/impacts/{after['id']}").json()["score"] == after["score"]
         assert api.post("/v1/score", json={"kinematics": impact_body()["kinematics"]}).json()["model"] == "spring"
         assert api.post("/v1/impacts", json=impact_body("before", 2.0)).json()["score"]["model"] == "laksari-2020"
+
+    def test_another_process_stores_scores_of_the_active_model_at_once(
+        self, api: Api, database: Database, spring: dict[str, Any]
+    ) -> None:
+        register(api, spring)
+        other = Api(api.portal, create_app(Settings(), database), api.key)
+        assert other.create("before")["score"]["model"] == "laksari-2020"
+        assert self.promote(api, "spring", 0).status_code == 200
+        assert other.create("after")["score"]["model"] == "spring"
 
     def test_rollback_is_the_same_call_and_the_history_says_why(self, api: Api, spring: dict[str, Any]) -> None:
         register(api, spring)

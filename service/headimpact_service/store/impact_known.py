@@ -1,0 +1,106 @@
+"""What is stored already that a new impact touches: one query for all of it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import NamedTuple
+
+from sqlalchemy import BindParameter, Connection, bindparam, func, select
+
+from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.store.clock import last_change
+from headimpact_service.store.impact_rows import NewImpact, Seen, external_id_digest
+from headimpact_service.store.prepared import Prepared
+from headimpact_service.store.tables import athletes, data_sets, devices, impacts, model_aliases, organisations
+
+_DATA_SET: BindParameter[bytes] = bindparam("data_set_id")
+
+
+class Known(NamedTuple):
+    """The rows that there are, and what a score has to be made under."""
+
+    last_change: datetime | None
+    athlete_by_name: bytes | None
+    merged_into: bytes | None
+    athlete_by_id: bytes | None
+    athlete_external_id: str | None
+    device: bytes | None
+    same_external_id: bytes | None
+    same_content: bytes | None
+    settings_revision: int | None
+    model: str | None
+    athlete_revision: int | None
+    device_revision: int | None
+
+    @property
+    def seen(self) -> Seen:
+        """What a score has to be made under."""
+        return Seen(self.settings_revision, self.model, self.athlete_revision, self.device_revision)
+
+    @property
+    def athlete(self) -> bytes | None:
+        """Whose the impact is, if that athlete is known: of one that was merged, into whom."""
+        return self.athlete_by_id or self.merged_into or self.athlete_by_name
+
+
+_ATHLETE_BY_ID = (
+    athletes.c.id == bindparam("athlete_id"),
+    athletes.c.data_set_id == _DATA_SET,
+    athletes.c.deleted_at.is_(None),
+)
+_ATHLETE_BY_NAME = (
+    athletes.c.data_set_id == _DATA_SET,
+    athletes.c.external_id == bindparam("athlete_external_id"),
+)
+_DEVICE = (devices.c.data_set_id == _DATA_SET, devices.c.serial == bindparam("serial"))
+_KNOWN = Prepared(
+    select(
+        last_change(impacts),
+        select(athletes.c.id).where(*_ATHLETE_BY_NAME).scalar_subquery(),
+        select(athletes.c.merged_into).where(*_ATHLETE_BY_NAME).scalar_subquery(),
+        select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),
+        select(athletes.c.external_id).where(*_ATHLETE_BY_ID).scalar_subquery(),
+        select(devices.c.id).where(*_DEVICE).scalar_subquery(),
+        select(impacts.c.id)
+        .where(impacts.c.data_set_id == _DATA_SET, impacts.c.external_id_digest == bindparam("external_id_digest"))
+        .scalar_subquery(),
+        select(impacts.c.id)
+        .where(impacts.c.data_set_id == _DATA_SET, impacts.c.input_digest == bindparam("input_digest"))
+        .order_by(impacts.c.id)
+        .limit(1)
+        .scalar_subquery(),
+        select(organisations.c.settings_revision)
+        .join(data_sets, data_sets.c.organisation_id == organisations.c.id)
+        .where(data_sets.c.id == _DATA_SET)
+        .scalar_subquery(),
+        select(model_aliases.c.version)
+        .where(
+            model_aliases.c.data_set_id == _DATA_SET,
+            model_aliases.c.name == "active",
+            model_aliases.c.superseded_at.is_(None),
+        )
+        .scalar_subquery(),
+        func.coalesce(
+            select(athletes.c.revision).where(*_ATHLETE_BY_ID).scalar_subquery(),
+            select(athletes.c.revision).where(*_ATHLETE_BY_NAME).scalar_subquery(),
+        ),
+        select(devices.c.revision).where(*_DEVICE).scalar_subquery(),
+    )
+)
+
+
+def look_up(conn: Connection, data_set_id: bytes, new: NewImpact) -> Known:
+    """What a new impact touches; a `not-found` problem for an athlete's id that is none of the data set's."""
+    parameters = {
+        "data_set_id": data_set_id,
+        "athlete_id": new.athlete_id,
+        "athlete_external_id": new.athlete_external_id,
+        "serial": new.device_serial,
+        "external_id_digest": external_id_digest(data_set_id, new.external_id),
+        "input_digest": new.input_digest,
+    }
+    known = Known(*(_KNOWN.first(conn, parameters) or ()))
+    if new.athlete_id is not None and known.athlete_by_id is None:
+        detail = "There is no athlete with this id."
+        raise Problem("not-found", detail, errors=[PayloadError(detail, "unknown-athlete", pointer="/athlete/id")])
+    return known
