@@ -149,7 +149,8 @@ class Vocabulary:
     def mapping(self, headings: Headings) -> mappings.Mapping:
         """The mapping that a table's headings, each with the unit beside it, amount to."""
         understood = [
-            (heading, self.understand(said)) for heading, said in zip(headings.written, headings.spoken, strict=True)
+            (heading, self.understand(said) or self.understand(heading))
+            for heading, said in zip(headings.written, headings.spoken, strict=True)
         ]
         found = [(heading, meaning) for heading, meaning in understood if meaning is not None]
         fields: dict[str, Any] = {}
@@ -158,7 +159,11 @@ class Vocabulary:
             if columns:
                 fields[signal] = _signal_columns(signal, columns)
         times = self.time(headings)
-        if times:
+        if any(headings.written.count(time.column) > 1 for time in times):  # one before each sensor's own columns
+            for found_signal in SIGNALS:
+                if found_signal in fields:
+                    fields[found_signal]["time"] = times
+        elif times:
             fields["time"] = times
         return mappings.Mapping.model_validate(fields)
 
@@ -174,7 +179,7 @@ class Vocabulary:
                 column = mappings.TimeColumn.model_validate({"column": heading, "unit": meaning.unit})
                 found.append((self._clocks[compact(said)], column))
         found.sort(key=lambda ranked: ranked[0])
-        return [column for rank, column in found if rank == found[0][0]]
+        return list({column.column: column for rank, column in found if rank == found[0][0]}.values())
 
 
 def _by_last_word(heading: str) -> Iterator[tuple[SignalName, str]]:

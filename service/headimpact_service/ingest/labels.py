@@ -44,7 +44,8 @@ def _json(value: Any) -> Any:  # noqa: ANN401 - validated after
 
 def _location(value: Any) -> Any:  # noqa: ANN401 - validated after
     """Where the signals were measured; a team's column of this name says where it played."""
-    return value if value in get_args(Location) else None
+    place = "_".join(value.lower().split()) if isinstance(value, str) else value
+    return place if place in get_args(Location) else None
 
 
 class Reading(Strict):

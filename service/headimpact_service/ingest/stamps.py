@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 
 ROUNDED_TO_MS = (1.0, 0.1, 0.01)
 """What stamps are written to."""
-NEAR, DRIFT = 0.6, 0.02
+NEAR, DRIFT = 0.6, 0.005
 """How far a stamp may be from where a stated rate has its sample: in samples, and by what went by since the first."""
 SAME_RATE: float = QUALITY_LIMITS["record"]["same_rate"]
 """Relative: rates that stamps say and that differ less are one rate."""

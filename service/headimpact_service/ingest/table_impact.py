@@ -276,10 +276,11 @@ class TableImpact:
         """
         asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
         said = self.options.sample_rate_hz or reading.sample_rate_hz
-        if said and reading.sample_rate_hz and abs(said - reading.sample_rate_hz) > DRIFT * said:
+        given = [rate for rate in (self.options.sample_rate_hz, reading.sample_rate_hz, asked) if rate is not None]
+        if given and max(given) - min(given) > DRIFT * min(given):
             raise label_fault(
-                f"The impact's row says {reading.sample_rate_hz:g} samples per second, and {said:g} were given beside "
-                "the file: leave out the rate that is wrong.",
+                f"The impact is said to have {min(given):g} samples per second and {max(given):g}: leave out the rate "
+                "that is wrong.",
                 "rate-differs",
                 parameter="sample_rate_hz",
             )
@@ -391,6 +392,7 @@ class TableImpact:
         stated = self.mapping.pre_trigger_ms
         if stated is not None:
             stated = max(0.0, round(stated - self._dropped_ms(tracks, kept), 9))
+        self._require_longer(kept, stated)
         spans = [span for track in kept if (span := track.span_ms) is not None]
         if not spans or "pre_trigger_ms" in self.plan.required or self.mapping.zero == "record_start":
             return stated
@@ -401,6 +403,16 @@ class TableImpact:
                 raise label_fault(detail, "time-zero")
             return 0.0
         return stated if before is None else before
+
+    def _require_longer(self, tracks: list[Track], before_ms: float | None) -> None:
+        """Refuse a record that is over before its trigger: it is not of this layout."""
+        lengths = [1000.0 * len(numbers_of(track.rows)) / track.rate for track in tracks if track.rate is not None]
+        if before_ms is not None and lengths and len(lengths) == len(tracks) and max(lengths) < before_ms:
+            raise label_fault(
+                f"The record of {max(lengths):g} ms is over before its trigger, which its layout puts at "
+                f"{before_ms:g} ms.",
+                "time-zero",
+            )
 
     def _dropped_ms(self, tracks: list[Track], kept: list[Track]) -> float:
         """How much later than the file's record the one that is kept begins."""

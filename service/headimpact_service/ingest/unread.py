@@ -31,7 +31,7 @@ _MEASURED = frozenset(
     }
 )
 """Words of what changes within an impact, whatever it is of: a sensor's temperature, an event's flag."""
-_TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock"})
+_TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
 _NUMBER = re.compile(r"[+-]?([0-9]+[.,]?[0-9]*|[.,][0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)

@@ -7,8 +7,7 @@ A new format is a reader and a place in this module: in :data:`READERS` if its c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.binary_formats import (
@@ -20,10 +19,7 @@ from headimpact_service.ingest.binary_formats import (
     read_parquet,
     read_xlsx,
 )
-from headimpact_service.ingest.csv_format import read_csv
 from headimpact_service.ingest.detect import HEAD, READ, Kind, detect
-from headimpact_service.ingest.dts import PRESET as DTS
-from headimpact_service.ingest.dts import is_dts, read_dts
 from headimpact_service.ingest.iso_mme import is_iso_mme, read_iso_mme
 from headimpact_service.ingest.json_format import read_json
 from headimpact_service.ingest.ndjson_format import read_ndjson
@@ -32,12 +28,10 @@ from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
+from headimpact_service.ingest.text_tables import holds_tables, read_folder, read_text_table
 from headimpact_service.ingest.zip_guard import GuardedZip
 
 Impacts = Iterator[ImpactRecord | Problem]
-TABLES = frozenset({".csv", ".tsv"})
-MAX_TABLE = 16 * 1024 * 1024
-"""Bytes of a table in an archive, which is held whole."""
 
 
 def read_upload(content: bytes | Path, options: ImportOptions) -> Impacts:
@@ -64,13 +58,6 @@ def sample_count(item: ImpactRecord | Problem) -> int:
     return 0 if isinstance(item, Problem) else item.values
 
 
-def _read_csv(source: Source, options: ImportOptions) -> Impacts:
-    """A table, or a laboratory's rows of properties above its samples."""
-    if options.preset in {None, DTS} and (options.preset == DTS or is_dts(source.head(HEAD))):
-        return read_dts(source, options)
-    return read_csv(source, options)
-
-
 def _read_zip(source: Source, options: ImportOptions) -> Impacts:
     with source.open() as stream:
         archive = GuardedZip(stream)
@@ -86,35 +73,8 @@ def _read_zip(source: Source, options: ImportOptions) -> Impacts:
     raise Problem("unsupported-media-type", f"The zip archive holds none of the files that are read: {READ}.")
 
 
-def _holds_tables(names: list[str]) -> bool:
-    return any(map(_is_table, names))
-
-
-def _is_table(name: str) -> bool:
-    return PurePosixPath(name).suffix.lower() in TABLES
-
-
-def _read_tables(archive: GuardedZip, options: ImportOptions) -> Impacts:
-    """Each table of a folder as the file that it is; one that cannot be read as a whole is refused alone."""
-    left = options.max_impacts
-    for name in sorted(filter(_is_table, archive.names)):
-        called = PurePosixPath(name).name
-        if archive.size(name) > MAX_TABLE:
-            detail = f"A table in an archive may have at most {MAX_TABLE} bytes: send {called} alone."
-            raise Problem("import-too-large", detail)
-        try:
-            source = Source(archive.read(name))
-            found = list(_read_csv(source, replace(options, filename=called, max_impacts=left)))
-        except Problem as problem:
-            if problem.slug == "import-too-large":
-                raise
-            found = [Problem(problem.slug, f"{called}: {problem.detail}", errors=problem.errors)]
-        left -= len(found)
-        yield from found
-
-
 READERS: dict[Kind, Callable[[Source, ImportOptions], Impacts]] = {
-    Kind.CSV: _read_csv,
+    Kind.CSV: read_text_table,
     Kind.JSON: read_json,
     Kind.NDJSON: read_ndjson,
     Kind.ZIP: _read_zip,
@@ -125,7 +85,7 @@ READERS: dict[Kind, Callable[[Source, ImportOptions], Impacts]] = {
 ARCHIVES: tuple[tuple[Callable[[list[str]], bool], Callable[[GuardedZip, ImportOptions], Impacts]], ...] = (
     (is_nhtsa, read_nhtsa),
     (is_iso_mme, read_iso_mme),
-    (_holds_tables, _read_tables),
+    (holds_tables, read_folder),
 )
 ZIPPED: tuple[tuple[Callable[[list[str]], bool], Callable[[Source, ImportOptions], Impacts]], ...] = (
     (is_xlsx, read_xlsx),

@@ -264,6 +264,11 @@ def test_a_rate_that_the_file_s_own_times_contradict_is_refused(options):
     assert "3200" in problem.detail
 
 
+def test_a_mapping_s_rate_that_the_rows_contradict_is_refused():
+    text = csv_text(before={"sample_rate_hz": "1000"}).replace("t_s", "x")
+    assert codes(refused(text, mapping=Mapping(sample_rate_hz=2000.0))) == [("sample_rate_hz", "rate-differs")]
+
+
 def test_times_that_are_wrong_can_be_left_out_for_a_rate():
     recording = one(csv_text(), sample_rate_hz=3200.0, mapping=Mapping(time=None)).recording
     assert recording.linear_acceleration is not None

@@ -178,3 +178,36 @@ def test_two_columns_of_times_that_do_not_agree_are_refused(other):
 def test_an_event_s_stamps_beside_the_samples_times_are_no_second_clock():
     record = one(twice_timed(lambda n: 1.7e12 + 7.0 * n, heading="timestamp_s", first="t_ms"))
     assert record.recording.pre_trigger_ms == 10.0
+
+
+@pytest.mark.parametrize(
+    "heading", ["Zeit [s]", "elapsed (s)", "Elapsed Time (s)", "Time from trigger (s)", "rel_time_s"]
+)
+def test_times_have_many_names(heading):
+    record = one(csv_text(heading=GENERIC.replace("t_s", heading)))
+    assert record.recording.linear_acceleration.sample_rate_hz == 1000.0
+    assert (
+        codes(refused(csv_text(heading=GENERIC.replace("t_s", heading)), sample_rate_hz=2000.0))[0][1] == "rate-differs"
+    )
+
+
+def test_units_below_headings_that_name_others_are_refused():
+    problem = refused(with_rows(GENERIC, "s,m/s2,m/s2,m/s2,rad/s,rad/s,rad/s"))
+    assert codes(problem)[0][1] == "units-differ"
+    assert "in g and in m/s^2" in problem.detail
+
+
+@pytest.mark.parametrize("rate", [1024.0, 975.0])
+def test_a_rate_that_is_not_that_of_the_stamps_is_refused(rate):
+    assert codes(refused(csv_text(rate_hz=rate), sample_rate_hz=1000.0)) == [("sample_rate_hz", "rate-differs")]
+
+
+def test_each_sensor_may_have_its_own_column_of_one_heading():
+    lines = csv_text().splitlines()[1:]
+    rows = [
+        ",".join([f"{n}", *line.split(",")[1:4], f"{n / 2 + 3}", *line.split(",")[4:]]) for n, line in enumerate(lines)
+    ]
+    record = one("\n".join(["Time (ms),ax_g,ay_g,az_g,Time (ms),wx_rad_s,wy_rad_s,wz_rad_s", *rows]))
+    a, w = record.recording.linear_acceleration, record.recording.angular_velocity
+    assert w.time_s[0] - a.time_s[0] == pytest.approx(0.003)
+    assert w.time_s[1] - w.time_s[0] == pytest.approx(0.0005)

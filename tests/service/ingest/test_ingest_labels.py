@@ -47,6 +47,7 @@ class TestReading:
 
     def test_a_row_may_say_where_its_signals_were_measured(self):
         assert one(labelled(location="sensor")).needs_device_mounting
+        assert one(labelled(location=" Sensor")).needs_device_mounting
         assert not one(labelled(location="head_cg")).needs_device_mounting
         assert not one(labelled(location="Croke Park")).needs_device_mounting
         mounted = one(labelled(location="sensor", mounting=json.dumps(MOUNTING)))

@@ -9,6 +9,7 @@ import pytest
 from binary_files import mat, noise, structs
 from ingest_files import codes, read, refused
 
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 
@@ -307,3 +308,28 @@ class TestOtherShapes:
         session = {"lin_acc_CG": values[:, :, :3], "ang_vel": values[:, :, 3:], "t": TIMES_S}
         found = records(mat({"session": session}), preset=PRESET)
         np.testing.assert_array_equal(np.stack([samples_of(record) for record in found]), values)
+
+    @pytest.mark.parametrize("shape", [(100, 7), (100, 6, 8), (8, 6, 60), (100, 8, 6), (8, 100, 9)])
+    def test_what_is_not_impacts_x_samples_x_six_is_not_the_laboratory_s(self, shape: tuple[int, ...]):
+        data = mat({"data": np.random.default_rng(3).normal(size=shape)})
+        found = read_or_refused(data, preset=PRESET)
+        assert all(isinstance(item, Problem) for item in found)
+
+    def test_what_stands_beside_cells_and_arrays_counts_for_all_impacts(self):
+        values = noise(2, 100)
+        cells = np.empty((1, 2), dtype=object)
+        for number, sent in enumerate(values):
+            cells[0, number] = sent
+        arrays = {"lin_acc_CG": values[:, :, :3], "ang_vel": values[:, :, 3:]}
+        both = structs(*({"lin_acc_CG": sent[:, :3], "ang_vel": sent[:, 3:]} for sent in values))
+        for variables in ({"hits": cells}, {"session": arrays}, {"impact": both}):
+            for beside in ({"fs": 2000.0}, {"time_ms": T_2KHZ * 1000.0}):
+                found = records(mat(variables | beside), preset=PRESET)
+                assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {2000.0}
+
+
+def read_or_refused(data: bytes, **options: Any) -> list[ImpactRecord | Problem]:
+    try:
+        return read(data, **options)
+    except Problem as problem:
+        return [problem]

@@ -10,7 +10,7 @@ from ingest_files import body, csv_text, encoded, one, outcome, read, refused, s
 from making import prevent
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest import upload
+from headimpact_service.ingest import text_tables
 from headimpact_service.ingest.detect import Kind, detect
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.stamps import nominal_rate
@@ -130,7 +130,7 @@ class TestFolderOfTables:
             }
         )
         found = read(data, athlete="p-1")
-        assert [item.metadata["file"] for item in found] == ["a.csv", "b.csv"]
+        assert [item.metadata["file"] for item in found] == ["session/a.csv", "session/b.csv"]
         assert [item.recording.linear_acceleration.values.max() for item in found] == [
             six_axis()[:, :3].max(),
             2.0 * six_axis()[:, :3].max(),
@@ -144,6 +144,12 @@ class TestFolderOfTables:
         assert alone.device_serial is not None
         assert (in_zip.device_serial, in_zip.occurred_at) == (alone.device_serial, alone.occurred_at)
 
+    def test_what_is_neither_a_table_nor_about_them_is_named(self) -> None:
+        data = zipped({"a.csv": csv_text(), "b.xlsx": b"?", "c/d.json": "{}", "LICENSE": "?", "picture.png": b"?"})
+        found = read(data)
+        assert [type(item) for item in found] == [ImpactRecord, Problem, Problem]
+        assert [item.detail.partition(" ")[0] for item in found[1:]] == ["b.xlsx", "c/d.json"]
+
     def test_one_that_cannot_be_read_is_refused_alone_and_by_name(self) -> None:
         broken = csv_text().replace("0.005,", "0.005,7,", 1)
         bad, good = read(zipped({"a.csv": broken, "b.csv": csv_text()}))
@@ -154,5 +160,5 @@ class TestFolderOfTables:
     def test_the_bounds_are_those_of_one_upload(self, monkeypatch: pytest.MonkeyPatch) -> None:
         data = zipped({f"{number}.csv": csv_text() for number in range(3)})
         assert statuses(outcome(data, max_impacts=2)) == {413}
-        monkeypatch.setattr(upload, "MAX_TABLE", 100)
+        monkeypatch.setattr(text_tables, "MAX_TABLE", 100)
         assert refused(data).slug == "import-too-large"

@@ -47,13 +47,14 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
     structs = [value for value in variables.values() if _is_struct(value)]
     cells = {name: value for name, value in variables.items() if _is_cells(value)}
     if structs:
-        shared = _facts(variables)
+        shared = _shared_by_all(variables)
         for struct in structs:
             elements, within = _elements(struct)
             yield NamedTable(None, _table_of([shared | within | _flat(element) for element in elements]))
     elif cells:
+        shared = _shared_by_all(variables)
         for name, value in cells.items():
-            yield NamedTable(None, _table_of([_of_cell(name, cell) for cell in value.reshape(-1)]))
+            yield NamedTable(None, _table_of([shared | _of_cell(name, cell) for cell in value.reshape(-1)]))
     else:
         yield NamedTable(None, _arrays(variables))
 
@@ -76,7 +77,10 @@ def _is_cells(value: Any) -> bool:  # noqa: ANN401 - whatever a file holds
 
 
 def _of_cell(name: str, cell: AnyArray) -> dict[str, Any]:
-    return _flat(cell.reshape(-1)[0]) if _is_struct(cell) else {name: cell, ALONE: cell}
+    """The fields of the impact in a cell; six components have the other name too."""
+    if _is_struct(cell):
+        return _flat(cell.reshape(-1)[0])
+    return {name: cell, ALONE: cell} if by_samples(cell).shape[1] == 2 * len(AXES) else {name: cell}
 
 
 def warm_up() -> None:
@@ -130,7 +134,7 @@ def _inflated(stream: BinaryIO, size: int, most: int) -> int:
 def _arrays(variables: dict[str, Any]) -> ArrayTable:
     """Every array impacts x samples x components, or else samples x components, or else a row of samples a channel.
 
-    Of one alone the columns are also called array_1, array_2 and so on.
+    Of one alone that has six components the columns are also called array_1 to array_6.
     """
     numbers = _numeric(variables, 2)
     solid = _numeric(variables, 3) or {name: value[np.newaxis] for name, value in _of_one_impact(variables).items()}
@@ -145,7 +149,7 @@ def _arrays(variables: dict[str, Any]) -> ArrayTable:
         raise unreadable(f"The last dimension of an array of samples is its 1 to {MAX_WIDTH} components.")
     impacts, length = next(iter(solid.values())).shape[:2]
     samples = [_samples(name, value) for name, value in solid.items()]
-    if len(solid) == 1 and ALONE not in solid:
+    if len(solid) == 1 and ALONE not in solid and samples[0].width == 2 * len(AXES):
         samples.append(_samples(ALONE, next(iter(solid.values()))))
     beside = {name: value for name, value in numbers.items() if name not in solid}
     fitted = ((name, _shared(name, value, impacts, length)) for name, value in beside.items())
@@ -172,13 +176,15 @@ def _shared(name: str, value: AnyArray, impacts: int, length: int) -> AnyArray |
     return np.broadcast_to(value.reshape(1, -1, 1), (impacts, length, 1))
 
 
-def _facts(fields: dict[str, Any]) -> dict[str, Any]:
-    """What is said once for all impacts beside them: lone numbers and texts."""
-    return {name: value for name, value in fields.items() if isinstance(value, np.ndarray) and _is_fact(value)}
+def _shared_by_all(fields: dict[str, Any]) -> dict[str, Any]:
+    """What is said once for all impacts beside them: lone numbers and texts, and rows of times."""
+    return {name: value for name, value in fields.items() if isinstance(value, np.ndarray) and _is_shared(name, value)}
 
 
-def _is_fact(value: AnyArray) -> bool:
-    return value.size == 1 and value.dtype.kind in "USfiu"
+def _is_shared(name: str, value: AnyArray) -> bool:
+    if value.size == 1:
+        return value.dtype.kind in "USfiu"
+    return value.ndim == 2 and value.dtype.kind in "fiu" and _is_row(value) and name.lower().startswith(TIMES)
 
 
 def _elements(struct: AnyArray) -> tuple[AnyArray, dict[str, Any]]:
@@ -190,7 +196,7 @@ def _elements(struct: AnyArray) -> tuple[AnyArray, dict[str, Any]]:
     if len(many) != 1 or many[0] is struct:
         return struct.reshape(-1), {}
     session = struct.reshape(-1)[0]
-    return many[0].reshape(-1), _facts({name: session[name] for name in session.dtype.names})
+    return many[0].reshape(-1), _shared_by_all({name: session[name] for name in session.dtype.names})
 
 
 def _of_many(struct: AnyArray, depth: int = 0) -> list[AnyArray]:
