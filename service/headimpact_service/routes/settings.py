@@ -70,7 +70,9 @@ async def read_settings(call: Call) -> Response:
     problems=("precondition-failed", "operating-point-unreachable"),
 )
 async def change_settings(call: Call) -> Response:
-    """New scores follow at once, in other processes within five seconds; stored scores stay as they are.
+    """Scores that are stored from now on follow at once, in every process; stored ones stay as they are.
+
+    `POST /v1/score` follows in other processes within five seconds.
 
     Live and test keys share them, so only a live key may change them.
     """
@@ -79,7 +81,7 @@ async def change_settings(call: Call) -> Response:
     revision = if_match(call.request)
     body: SettingsBody = call.body
     named = body.model_fields_set
-    points = _points(body, call.terms.model)
+    points = _points(body, (await call.renewed()).terms.model)
 
     def change(conn: Any) -> OrganisationSettings:  # noqa: ANN401 - a connection of the store
         present = organisation_settings.get(conn, call.key.organisation_id)
