@@ -33,7 +33,8 @@ def facts_of(
     serials = {record.device_serial for record in records if record.device_serial is not None}
     names = {record.athlete_external_id for record in records if record.athlete_external_id is not None}
     known = {serial: _device(device) for serial, device in devices.get_many(conn, data_set_id, serials).items()}
-    named = athletes.find_many(conn, data_set_id, names)
+    found = athletes.find_many(conn, data_set_id, names)
+    named = {name: _as_merged(conn, data_set_id, athlete) for name, athlete in found.items()}
     by_id = cache(partial(_athlete_in, conn, data_set_id, external_id=None))
 
     def look_up(record: ImpactRecord) -> tuple[ImpactRecord, DeviceFacts]:
@@ -51,7 +52,13 @@ def _athlete_in(conn: Any, data_set_id: bytes, athlete_id: str | None, external_
     raw = None if athlete_id is None else ids.decode("ath", athlete_id)
     if raw is not None:
         return athletes.get(conn, data_set_id, raw)
-    return None if external_id is None else athletes.find(conn, data_set_id, external_id)
+    found = None if external_id is None else athletes.find(conn, data_set_id, external_id)
+    return None if found is None else _as_merged(conn, data_set_id, found)
+
+
+def _as_merged(conn: Any, data_set_id: bytes, athlete: Athlete) -> Athlete | None:  # noqa: ANN401 - a connection of the store
+    """Who an athlete is now: of one that was merged, the one who stayed."""
+    return athlete if athlete.merged_into is None else athletes.get(conn, data_set_id, athlete.merged_into)
 
 
 def _device(device: devices.Device | None) -> DeviceFacts:

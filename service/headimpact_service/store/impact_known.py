@@ -52,12 +52,14 @@ _ATHLETE_BY_NAME = (
     athletes.c.data_set_id == _DATA_SET,
     athletes.c.external_id == bindparam("athlete_external_id"),
 )
+_TARGET = athletes.alias("target")
+_MERGED_INTO = select(athletes.c.merged_into).where(*_ATHLETE_BY_NAME).scalar_subquery()
 _DEVICE = (devices.c.data_set_id == _DATA_SET, devices.c.serial == bindparam("serial"))
 _KNOWN = Prepared(
     select(
         last_change(impacts),
         select(athletes.c.id).where(*_ATHLETE_BY_NAME).scalar_subquery(),
-        select(athletes.c.merged_into).where(*_ATHLETE_BY_NAME).scalar_subquery(),
+        _MERGED_INTO,
         select(athletes.c.id).where(*_ATHLETE_BY_ID).scalar_subquery(),
         select(athletes.c.external_id).where(*_ATHLETE_BY_ID).scalar_subquery(),
         select(devices.c.id).where(*_DEVICE).scalar_subquery(),
@@ -82,6 +84,9 @@ _KNOWN = Prepared(
         .scalar_subquery(),
         func.coalesce(
             select(athletes.c.revision).where(*_ATHLETE_BY_ID).scalar_subquery(),
+            select(_TARGET.c.revision)
+            .where(_TARGET.c.data_set_id == _DATA_SET, _TARGET.c.id == _MERGED_INTO)
+            .scalar_subquery(),
             select(athletes.c.revision).where(*_ATHLETE_BY_NAME).scalar_subquery(),
         ),
         select(devices.c.revision).where(*_DEVICE).scalar_subquery(),

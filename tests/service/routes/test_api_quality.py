@@ -212,3 +212,16 @@ class TestUnscorable:
         raw = api.get(f"/v1/impacts/{impact['id']}/traces").json()
         assert raw["linear_acceleration"]["x"][5] is None
         assert api.post("/v1/impacts", json=body).status_code == 200
+
+
+def test_the_old_name_of_a_merged_athlete_tells_of_the_one_who_stayed(api: Api) -> None:
+    stays = api.post("/v1/athletes", json={"external_id": "p-stays", "sex": "female"}).json()["id"]
+    goes = api.post("/v1/athletes", json={"external_id": "p-goes"}).json()["id"]
+    assert api.post(f"/v1/athletes/{goes}/merge", json={"into": stays}).status_code == 200
+    one = sent(api, impact_body("e-1", athlete={"external_id": "p-goes"}))
+    assert (one["athlete"]["id"], len(notes(one, "outside_model_population"))) == (stays, 1)
+    line = json.dumps(impact_body("e-2", scale=1.5, athlete={"external_id": "p-goes"})).encode()
+    answer = api.post("/v1/imports", content=line, headers={"Content-Type": "application/x-ndjson"})
+    [row] = answer.json()["data"]
+    two = api.get(f"/v1/impacts/{row['id']}").json()
+    assert (two["athlete"]["id"], len(notes(two, "outside_model_population"))) == (stays, 1)
