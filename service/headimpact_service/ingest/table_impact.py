@@ -10,7 +10,6 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant
@@ -30,16 +29,16 @@ from headimpact_service.ingest.labels import (
     moment,
     reading_of,
 )
-from headimpact_service.ingest.layout import Clock, Layout, SignalLayout
+from headimpact_service.ingest.layout import Clock, SignalLayout
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.row_labels import RowLabels
+from headimpact_service.ingest.samples import Samples
 from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows
-from headimpact_service.ingest.steady import changed_rows
-from headimpact_service.ingest.table import Columns, FloatArray
+from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
-from headimpact_service.ingest.windows import Rows, Window, numbers_of
+from headimpact_service.ingest.windows import Rows, numbers_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,59 +51,6 @@ class Plan:
     options: ImportOptions
     format: str
     named: NamedFacts = NOT_NAMED
-
-
-class Samples:
-    """A window's columns, put together into signals once for all its impacts."""
-
-    def __init__(self, layout: Layout, window: Window) -> None:
-        """Assemble every signal."""
-        columns = window.columns
-        self.layout, self.window, self.texts, self.numbers = layout, window, columns.texts, columns.numbers
-        self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
-        self._changes = self._changed(layout)
-        self.is_whole = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
-
-    def _changed(self, layout: Layout) -> NDArray[np.intp] | None:
-        """How often what rows say of their impact has changed, row by row; None where nothing is said in rows."""
-        columns = sorted({*layout.labels, *layout.occurred_at})
-        if not columns or self.window.columns.lengths is not None:
-            return None
-        return np.cumsum(changed_rows(self.texts, columns, self.window.columns.rows))
-
-    def are_alike(self, rows: Rows) -> bool:
-        """Whether the rows surely say the same of their impact; where not, one has to look."""
-        if self._changes is None:
-            return True
-        return isinstance(rows, slice) and bool(self._changes[rows.start] == self._changes[rows.stop - 1])
-
-    @property
-    def has_ends(self) -> bool:
-        """Whether a signal may end before its impact does: arrays and lists of unlike lengths."""
-        return self.window.columns.lengths is not None and not self.is_whole
-
-    def require_finite(self, columns: list[int], rows: Rows, first: int) -> None:
-        """Refuse rows in which a cell is not a finite number."""
-        if self.is_whole:
-            return
-        for column in columns:
-            faulty = np.flatnonzero(~np.isfinite(self.numbers[column][rows]))
-            if faulty.size:
-                raise label_fault(
-                    f"A cell of column {column + 1} is not a finite number, at sample {faulty[0]} of the impact that "
-                    f"begins in row {first + 1} below the headings.",
-                    "missing-sample",
-                )
-
-
-def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
-    """A signal's three columns with their signs; one that a constrained plane leaves out is zero."""
-    values = np.zeros((columns.rows, 3))
-    for axis, component in enumerate(signal.components):
-        if component.column is not None:
-            with np.errstate(invalid="ignore"):  # a binary file may hold NaNs that signal
-                np.multiply(columns.numbers[component.column], component.sign, out=values[:, axis])
-    return values
 
 
 class TableImpact:
@@ -275,17 +221,11 @@ class TableImpact:
         A signal that has a rate of its own, and no times, does not go by those that the others share.
         """
         asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
-        said = self.options.sample_rate_hz or reading.sample_rate_hz
-        given = [rate for rate in (self.options.sample_rate_hz, reading.sample_rate_hz, asked) if rate is not None]
-        if given and max(given) - min(given) > DRIFT * min(given):
-            raise label_fault(
-                f"The impact is said to have {min(given):g} samples per second and {max(given):g}: leave out the rate "
-                "that is wrong.",
-                "rate-differs",
-                parameter="sample_rate_hz",
-            )
-        if said is None and signal.sample_rate_hz is not None and signal.clock is None:
-            return signal.sample_rate_hz
+        beside, own = self.options.sample_rate_hz, signal.sample_rate_hz if signal.clock is None else None
+        _require_one_rate([beside, own] if own else [beside, reading.sample_rate_hz, asked])
+        if own is not None:
+            return own
+        said = beside or reading.sample_rate_hz
         rate = said or signal.sample_rate_hz or asked
         if rate is None or clock is None or self._stands_still(clock, rows):
             return rate
@@ -463,3 +403,15 @@ class TableImpact:
         """What the file itself calls the impact, where that is no name outside it."""
         known = [key for key in keys if key is not None]
         return {"impact": " ".join(known)[:MAX_NAME]} if known else {}
+
+
+def _require_one_rate(said: Iterable[float | None]) -> None:
+    """Refuse rates of one signal that differ by more than what clocks drift."""
+    given = [rate for rate in said if rate is not None]
+    if given and max(given) - min(given) > DRIFT * min(given):
+        raise label_fault(
+            f"The impact is said to have {min(given):g} samples per second and {max(given):g}: leave out the rate that "
+            "is wrong.",
+            "rate-differs",
+            parameter="sample_rate_hz",
+        )

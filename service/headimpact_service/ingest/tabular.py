@@ -14,9 +14,10 @@ from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import Preset, preset_named, recognise, spoken_of
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
+from headimpact_service.ingest.samples import Samples
 from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.table import Table
-from headimpact_service.ingest.table_impact import Plan, Samples, TableImpact
+from headimpact_service.ingest.table_impact import Plan, TableImpact
 from headimpact_service.ingest.windows import Window, windows
 
 
