@@ -27,7 +27,7 @@ from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
-from headimpact_service.ingest.text_facts import delimiter_of, text_facts, unreadable
+from headimpact_service.ingest.text_facts import MAX_LINE, delimiter_of, text_facts, unreadable
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -99,7 +99,14 @@ class CsvTable:
         top = top_of(ahead, search=not skip_rows)
         self._lines = chain(ahead[top.heading + 1 :], self._lines)
         self._line += top.heading
-        return ahead[top.heading], top.units > 0
+        return self._whole(ahead[top.heading]), top.units > 0
+
+    def _whole(self, line: str) -> str:
+        """A line with those on which a quoted cell of it goes on."""
+        while line.count('"') % 2 and len(line) <= MAX_LINE and (more := next(self._lines, None)) is not None:
+            self._line += 1
+            line += more
+        return line
 
     def _read_units(self, reader: Reader) -> dict[int, str]:
         """The row of units below the headings."""

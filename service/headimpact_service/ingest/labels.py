@@ -28,6 +28,7 @@ from headimpact_service.ingest.json_faults import payload_errors
 from headimpact_service.ingest.times import TimeError, instant
 
 _PRINTABLE = re.compile(PRINTABLE)
+_DECIMAL_COMMA = re.compile(r"[0-9]+,([0-9]{1,2}|[0-9]{4,})")
 Texts = tuple[tuple[str, str], ...]
 """Fields and their cells, those that are empty left out."""
 
@@ -48,16 +49,21 @@ def _location(value: Any) -> Any:  # noqa: ANN401 - validated after
     return place if place in get_args(Location) else None
 
 
+def _point(value: Any) -> Any:  # noqa: ANN401 - validated after
+    """A number with a decimal comma that cannot group thousands, with a point."""
+    return value.replace(",", ".") if isinstance(value, str) and _DECIMAL_COMMA.fullmatch(value) else value
+
+
 class Reading(Strict):
     """How an impact's samples are to be read, as its row says; each field as in the JSON of an impact."""
 
     axes: Axes | None = None
     filter: Annotated[Filter, BeforeValidator(_json)] | None = None
     constrained_plane: Plane | None = None
-    pre_trigger_ms: float | None = Field(None, ge=0.0, le=60_000.0)
+    pre_trigger_ms: Annotated[float | None, BeforeValidator(_point)] = Field(None, ge=0.0, le=60_000.0)
     location: Annotated[Location | None, BeforeValidator(_location)] = None
     mounting: Annotated[MountingBody, BeforeValidator(_json)] | None = None
-    sample_rate_hz: float | None = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
+    sample_rate_hz: Annotated[float | None, BeforeValidator(_point)] = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
     fill_gaps: bool = False
 
 

@@ -78,6 +78,13 @@ class TestTop:
         above = ["Device: X1", "", lines[0], UNITS]
         assert "in line 9 has 8 cells" in refused("\n".join([*above, *lines[1:]])).detail
 
+    def test_headings_may_go_on_over_lines(self):
+        heading = ",".join(f'"{name.replace("_", chr(10), 1)}"' for name in GENERIC.split(","))
+        lines = csv_text().splitlines()[1:]
+        assert np.array_equal(samples_of(one("\n".join([heading, *lines]))), samples_of(one(csv_text())))
+        lines[4] += ",1"
+        assert "in line 13 has 8 cells" in refused("\n".join([heading, *lines])).detail
+
     def test_a_row_s_line_is_that_of_the_file_though_cells_go_on_over_lines(self):
         lines = [f'{line},"a{chr(10)}b"' for line in csv_text().splitlines()]
         lines[0] = lines[0].replace('"a\nb"', "note")

@@ -45,6 +45,11 @@ class TestReading:
         assert recording.linear_acceleration.sample_rate_hz == 1001.5
         assert recording.mounting.offset_m.tolist() == [0.07, 0.0, -0.01]
 
+    def test_a_number_may_have_a_decimal_comma_that_groups_no_thousands(self):
+        recording = one(labelled(pre_trigger_ms="7,5", sample_rate_hz="1000,0")).recording
+        assert (recording.pre_trigger_ms, recording.linear_acceleration.sample_rate_hz) == (7.5, 1000.0)
+        assert codes(refused(labelled(sample_rate_hz="1,000")))[0][0] == "sample_rate_hz"
+
     def test_a_row_may_say_where_its_signals_were_measured(self):
         assert one(labelled(location="sensor")).needs_device_mounting
         assert one(labelled(location=" Sensor")).needs_device_mounting

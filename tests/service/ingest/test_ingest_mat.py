@@ -303,6 +303,12 @@ class TestOtherShapes:
         found = records(mat({"hits": cells}), preset=PRESET)
         np.testing.assert_array_equal(np.stack([samples_of(record) for record in found]), values)
 
+    def test_a_session_may_hold_one_impact(self):
+        [values] = noise(1, 100)
+        impact = structs({"t": TIMES_S[:, None], "lin_acc_CG": values[:, :3], "ang_vel": values[:, 3:]})
+        [record] = records(mat({"session": {"player": "p-1", "impact": impact}}), preset=PRESET)
+        np.testing.assert_array_equal(samples_of(record), values)
+
     def test_a_struct_may_hold_the_arrays_of_all_impacts(self):
         values = noise(3, 100)
         session = {"lin_acc_CG": values[:, :, :3], "ang_vel": values[:, :, 3:], "t": TIMES_S}

@@ -50,7 +50,7 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
         shared = _shared_by_all(variables)
         for struct in structs:
             elements, within = _elements(struct)
-            yield NamedTable(None, _table_of([shared | within | _flat(element) for element in elements]))
+            yield NamedTable(None, _table_of([shared | within | _fields(element) for element in elements]))
     elif cells:
         shared = _shared_by_all(variables)
         for name, value in cells.items():
@@ -217,6 +217,14 @@ def _flat(record: Any, before: str = "", depth: int = 0) -> dict[str, Any]:  # n
         else:
             fields[before + name] = value
     return fields
+
+
+def _fields(record: Any) -> dict[str, Any]:  # noqa: ANN401 - a record of a struct array
+    """The fields of one impact, or of a session's struct that holds one impact: then by that one's own names too."""
+    inner = [value for name in record.dtype.names if _is_struct(value := record[name]) and value.size == 1]
+    if len(inner) != 1 or any(holds_samples(record[name]) for name in record.dtype.names):
+        return _flat(record)
+    return _flat(inner[0].reshape(-1)[0]) | _flat(record)
 
 
 def _is_struct(value: Any) -> bool:  # noqa: ANN401 - whatever a file holds
