@@ -43,7 +43,7 @@ from headimpact_service.store.impacts import Impact, ImpactFilters
 
 routes = Routes("impacts")
 
-TRIES = 4
+TRIES = 20
 """How often an impact is scored before it is answered that what it depends on keeps changing."""
 ETAG = {"ETag": "The revision, for If-Match."}
 LOCATION = {"Location": "The impact's address."}
