@@ -203,8 +203,9 @@ class _Data:
 
     def points(self, index: int) -> float | None:
         """How many samples the header says that a channel has: in all, or before and after the trigger."""
-        said = [self.header.of_channel(key, index) for key in ("points", "before", "after")]
-        points, before, after = (float(cell) if A_NUMBER.fullmatch(cell) else None for cell in said)
+        said = [self.header.of_channel(key, index) for key in ("points", "after")]
+        points, after = (float(cell) if A_NUMBER.fullmatch(cell) else None for cell in said)
+        before = self.header.points_before(self.rate)
         if points is not None or before is None or after is None:
             return points
         # some count the trigger's own sample with those after it, some with neither

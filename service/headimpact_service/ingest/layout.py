@@ -106,10 +106,12 @@ class Layout:
         return self.clock is not None or all(signal.clock is not None for signal in self.signals.values())
 
     def watching(self, headings: Headings) -> Layout:
-        """The same, with the columns beside it that tell several impacts from one, unless others do."""
-        if self.keys or self.is_timed or self.sample_number is not None:
+        """The same, with the columns beside it that may tell several impacts from one."""
+        if self.sample_number is not None:
             return self
-        return replace(self, unread=unread_columns(headings.written, {*self.numbers, *self.texts}))
+        read = {*self.numbers, *self.texts}
+        found = unread_columns(headings.written, read, timed=self.is_timed, keyed=bool(self.keys))
+        return replace(self, unread=found)
 
 
 def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> Layout:

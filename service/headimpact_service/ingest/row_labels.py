@@ -40,9 +40,9 @@ class RowLabels:
 
     def require_one_impact(self, time_zone: str | None) -> None:
         """Refuse rows that say different things of their impact: they are several, and nothing tells them apart."""
-        self._require_unread_alike(time_zone)
         if self.alike:
             return
+        self._require_unread_alike(time_zone)
         for column in self.layout.labels:
             if len([cell for cell in self._distinct(column) if cell]) > 1:
                 raise self._several(f"Column {column + 1} does not say the same")

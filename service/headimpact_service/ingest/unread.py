@@ -1,7 +1,8 @@
 """Columns that no layout reads, but that may tell that the rows of a table are several impacts.
 
-They are looked at where nothing else would: a table without a column that tells impacts apart, and without times, which
-would begin anew with each. A mapping's empty ``group_by`` says that all rows are one impact.
+Numbers of impacts may start again with every player or session, so the columns that name those must not change within
+an impact either. Where all signals have times, which would begin anew, times and numbers of samples tell nothing more.
+A mapping's empty ``group_by`` says that all rows are one impact.
 """
 
 from __future__ import annotations
@@ -24,10 +25,27 @@ _NAMES = frozenset(
         *("player", "athlete", "subject", "wearer", "user", "participant", "team", "sensor", "device"),
     }
 )
+_PERSONS = frozenset({"player", "athlete", "subject", "wearer", "user", "participant"})
 _MEASURED = frozenset(
     {
         *("temp", "temperature", "battery", "voltage", "volt", "charge", "current", "pressure", "humidity", "force"),
-        *("flag", "trigger", "triggered", "status", "threshold", "quality", "valid", "proximity", "distance", "light"),
+        *(
+            "is",
+            "flag",
+            "trigger",
+            "triggered",
+            "saturated",
+            "saturation",
+            "active",
+            "state",
+            "status",
+            "threshold",
+            "quality",
+            "valid",
+            "proximity",
+            "distance",
+            "light",
+        ),
     }
 )
 """Words of what changes within an impact, whatever it is of: a sensor's temperature, an event's flag."""
@@ -36,6 +54,7 @@ _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "poi
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
 _NUMBER = re.compile(r"[+-]?([0-9]+[.,]?[0-9]*|[.,][0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 _WITH_PARTS = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
+_YES_OR_NO = ({"0", "1"}, {"true", "false"}, {"yes", "no"}, {"y", "n"}, {"t", "f"}, {"t", "n"})
 ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
 STAY = 10
@@ -59,18 +78,25 @@ class Unread:
 NOTHING_UNREAD = Unread()
 
 
-def unread_columns(headings: Sequence[str], read: Collection[int]) -> Unread:
-    """The columns beside those that are read whose headings speak of impacts, of times or of samples."""
-    names, times, counters = [], [], []
+def unread_columns(headings: Sequence[str], read: Collection[int], *, timed: bool, keyed: bool) -> Unread:
+    """The columns beside those that are read whose headings speak of impacts, of times or of samples.
+
+    Of a table whose samples have times only names; where nothing tells impacts apart, only those of people: an event
+    may be marked within one impact.
+    """
+    telling = _NAMES if keyed or not timed else _PERSONS
+    names: list[int] = []
+    times: list[int] = []
+    counters: list[int] = []
     for column, heading in enumerate(headings):
         words = {word.lower() for word in _WORD.findall(heading)}
         if column in read:
             continue
         if words & _COUNTERS:
-            counters.append(column)
+            counters += [] if timed else [column]
         elif words & _TIMES:
-            times.append(column)
-        elif words & _NAMES and not words & _MEASURED:
+            times += [] if timed else [column]
+        elif words & telling and not words & _MEASURED:
             names.append(column)
     return Unread(tuple(names), tuple(times), tuple(counters))
 
@@ -87,7 +113,10 @@ def _numbers(cells: Sequence[str]) -> list[float]:
 
 def are_several(cells: Sequence[str]) -> bool:
     """Whether a column names more than one thing: not one that is measured, nor one that numbers its rows."""
-    distinct = set(filter(None, map(said, cells)))
+    told = list(filter(None, map(said, cells)))
+    distinct = set(told)
+    if {word.lower() for word in distinct} in _YES_OR_NO and sum(a != b for a, b in pairwise(told)) > 1:
+        return False  # a mark that came and went
     return 1 < len(distinct) < len(cells) and not any(map(_WITH_PARTS.fullmatch, distinct))
 
 

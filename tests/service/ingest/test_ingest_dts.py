@@ -307,3 +307,9 @@ def test_headings_in_another_order_than_the_codes_are_refused():
     turned = ",".join(["Time (sec)", *reversed(DTS_COLUMNS)])
     assert headings in text
     assert codes(refused(text.replace(headings, turned))) == [(None, "heading-order")]
+
+
+def test_a_time_before_the_trigger_counts_its_samples():
+    text = dts(before=None, time_column=False, changes={"Pre Trigger (sec)": [0.0005], "Post-zero Points": [50]})
+    text = text.replace("Number of Pts (Total)", "Points of the disk")
+    assert one(text).notes == ()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from ingest_files import codes, csv_text, one, refused
+from ingest_files import codes, csv_text, one, read, refused, six_axis
 
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
@@ -79,6 +79,9 @@ def test_rows_that_an_unread_column_tells_apart_are_refused(heading: str, cells:
         ("temperature", [20 + n // 10 for n in range(SAMPLES)]),
         ("Sensor Temp", [20 + n // 10 for n in range(SAMPLES)]),
         ("Event Flag", [int(n > 9) for n in range(SAMPLES)]),
+        ("Is Impact", [str(n > 9).lower() for n in range(SAMPLES)]),
+        ("Sensor Saturated", [int(n > 9) for n in range(SAMPLES)]),
+        ("Device Event", ["T" if n == 9 else "N" for n in range(SAMPLES)]),
         ("Player", [*[""] * 39, "A"]),
     ],
 )
@@ -108,3 +111,38 @@ def test_times_that_differ_are_those_of_several_impacts_though_the_sender_gives_
     broken = untimed("occurred_at", each("37:10.6"), records=1)
     found = one(broken, sample_rate_hz=1000.0, occurred_at="2026-11-20T19:00:00Z")
     assert found.occurred_at is not None
+
+
+@pytest.mark.parametrize("timed", [False, True])
+@pytest.mark.parametrize(
+    ("heading", "cells"), [("Player", ("PA", "PB")), ("Session", ("s1", "s2")), ("File", ("a", "b"))]
+)
+def test_numbers_of_impacts_that_start_again_with_a_player_are_not_joined(
+    heading: str, cells: tuple[str, str], timed: bool
+) -> None:
+    first, *lines = csv_text(np.vstack([six_axis(SAMPLES), six_axis(SAMPLES)])).splitlines()
+    names, rows = (first, lines) if timed else (first.partition(",")[2], [line.partition(",")[2] for line in lines])
+    told = [f"{cells[number // SAMPLES]},1,{row}" for number, row in enumerate(rows)]
+    text = "\n".join([f"{heading},impact_id,{names}", *told])
+    problem = refused(text, sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "several-impacts")]
+    found = read(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[heading, "impact_id"]))
+    assert [shape(record) for record in found] == [SAMPLES, SAMPLES]
+
+
+def test_samples_that_are_counted_anew_within_a_named_impact_are_several() -> None:
+    text = untimed("impact_id,Sample", [f"1,{n}" for n in range(SAMPLES)] * 2, records=2)
+    assert codes(refused(text, sample_rate_hz=1000.0)) == [(None, "several-impacts")]
+    apart = [f"{k},{n}" for k in (1, 2) for n in range(SAMPLES)]
+    assert [shape(record) for record in read(untimed("impact_id,Sample", apart, records=2), sample_rate_hz=1000.0)] == [
+        40,
+        40,
+    ]
+
+
+def test_times_that_go_on_are_of_one_person() -> None:
+    first, *lines = csv_text().splitlines()
+    told = [f"{'PA' if number < 20 else 'PB'},{line}" for number, line in enumerate(lines)]
+    assert codes(refused("\n".join([f"Player,{first}", *told]))) == [(None, "several-impacts")]
+    marked = [f"{int(number == 9)},{line}" for number, line in enumerate(lines)]
+    assert shape(one("\n".join([f"Event,{first}", *marked]))) == SAMPLES

@@ -86,7 +86,7 @@ def test_what_changes_at_every_try_is_503_and_stores_nothing(
     with database.read() as conn:
         key = keys.find_key(conn, api.key or "")
     assert key is not None
-    real, incidences = impact_routes.score, iter([0.01, 0.02, 0.03, 0.04])
+    real, incidences = impact_routes.score, iter([0.01 + 0.001 * number for number in range(impact_routes.TRIES)])
 
     async def scored_before_a_change(*given: Any) -> Any:
         found = await real(*given)
