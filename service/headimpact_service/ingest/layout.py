@@ -105,6 +105,13 @@ class Layout:
         """Whether every signal has stamps."""
         return self.clock is not None or all(signal.clock is not None for signal in self.signals.values())
 
+    def ends_alone(self, name: SignalName) -> bool:
+        """Whether a signal's rows may end before the others': it has times or a rate of its own, or others have."""
+        own = {
+            signal: laid.clock is not None or laid.sample_rate_hz is not None for signal, laid in self.signals.items()
+        }
+        return own[name] or (self.clock is None and any(own.values()))
+
     def watching(self, headings: Headings) -> Layout:
         """The same, with the columns beside it that may tell several impacts from one."""
         if self.sample_number is not None:

@@ -208,7 +208,7 @@ class TableImpact:
     def _track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
         signal = self.layout.signals[name]
         clock = signal.clock or self.layout.clock
-        if signal.clock is not None or signal.sample_rate_hz is not None or self.samples.has_ends:
+        if self.layout.ends_alone(name) or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         rate = self._said_rate(signal, clock, reading, rows)
         if clock is None or (rate is not None and self._stands_still(clock, rows)):

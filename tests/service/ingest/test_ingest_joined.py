@@ -169,3 +169,16 @@ def test_a_number_that_is_a_name_has_no_more_digits_than_it_needs(number: float,
     rows = [[number, *row] for row in six_axis().tolist()]
     [record] = records(xlsx({"a": [headings, *rows]}), sample_rate_hz=1000.0)
     assert record.athlete_external_id == name
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_the_rows_of_the_slower_sensor_end_where_its_cells_are_empty(shared: bool) -> None:
+    first, *rows = generic().splitlines()
+    text = "\n".join([first, *rows[:20], *(",".join(["", "", "", *row.split(",")[3:]]) for row in rows[20:])])
+    own: dict[str, Any] = {"angular_velocity": {"sample_rate_hz": 2000}}
+    rate = {"sample_rate_hz": 1000} if shared else {"linear_acceleration": {"sample_rate_hz": 1000}}
+    [record] = records(text, preset="generic_six_axis", mapping=Mapping.model_validate(own | rate))
+    assert [(signal.values.shape[0], signal.sample_rate_hz) for _, signal in record.recording.signals()] == [
+        (20, 1000.0),
+        (40, 2000.0),
+    ]
