@@ -44,8 +44,8 @@ from headimpact_service.settings import Settings
 from headimpact_service.store.database import Database
 from headimpact_service.store.unavailable import reason_of
 
-# In the order of the documentation; the first are matched first, so the busy ones lead.
 _log = logging.getLogger(__name__)
+# In the order of the documentation; the first are matched first, so the busy ones lead.
 _MODULES = (
     scoring,
     impacts,

@@ -5,6 +5,7 @@ What a table says of an impact stands in each of its rows and is read from the f
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import accumulate, chain
@@ -18,6 +19,7 @@ NOTHING = frozenset({"", "-", ".", "na", "n/a", "#n/a", "nan", "nat", "null", "m
 
 Not `none`: that is a filter.
 """
+_WRITTEN_NUMBER = re.compile(r"[+-]?([0-9]+[.,]?[0-9]*|[.,][0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 
 
 def said(cell: str) -> str:
@@ -29,6 +31,11 @@ def said(cell: str) -> str:
 def is_no_number(cell: str) -> bool:
     """Whether a cell among numbers holds nothing, rather than something that is none."""
     return said(cell).lower() in {"", "none"}
+
+
+def is_written_number(cell: str) -> bool:
+    """Whether a cell is a number, with a decimal point or a decimal comma."""
+    return _WRITTEN_NUMBER.fullmatch(cell.strip()) is not None
 
 
 def number_text(value: float) -> str:

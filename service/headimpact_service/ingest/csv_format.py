@@ -99,7 +99,7 @@ class CsvTable:
         top = top_of(ahead, search=not skip_rows)
         self._lines = chain(ahead[top.heading + 1 :], self._lines)
         self._line += top.heading
-        return self._whole(ahead[top.heading]), top.units > 0
+        return self._whole(ahead[top.heading]), top.has_units
 
     def _whole(self, line: str) -> str:
         """A line with those on which a quoted cell of it goes on."""

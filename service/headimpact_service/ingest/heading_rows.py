@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from headimpact_service.ingest.cells import is_written_number
 from headimpact_service.ingest.spelling import compact, known_units
+from headimpact_service.ingest.text_facts import DELIMITERS
 
 LOOK = 60
 """Lines among which a table begins."""
 MAX_UNIT = 16
-_NUMBER = re.compile(r"\s*[+-]?([0-9]+[.,]?[0-9]*|[.,][0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
-_DELIMITERS = (",", ";", "\t")
 
 
 @dataclass(frozen=True, slots=True)
 class Top:
-    """The line of headings, and how many of units follow it: one or none."""
+    """The line of headings, and whether one of units follows it."""
 
     heading: int
-    units: int
+    has_units: bool
 
 
 def are_units(headings: Sequence[str], cells: Sequence[str]) -> bool:
@@ -41,12 +40,12 @@ def top_of(lines: Sequence[str], *, search: bool) -> Top:
     """
     found = _first_numbers(lines)
     if found is None:
-        return Top(0, 0)
+        return Top(0, has_units=False)
     numbers, delimiter = found
     rows = [_cells(line, delimiter) for line in lines[: numbers + 1]]
     heading = _heading(rows) if search else 0
     below = heading + 1
-    return Top(heading, int(below < numbers and are_units(rows[heading], rows[below])))
+    return Top(heading, below < numbers and are_units(rows[heading], rows[below]))
 
 
 def _first_numbers(lines: Sequence[str]) -> tuple[int, str] | None:
@@ -54,7 +53,7 @@ def _first_numbers(lines: Sequence[str]) -> tuple[int, str] | None:
     for place, line in enumerate(lines):
         if '"' in line and line.count('"') % 2:
             return None  # a cell in quotes goes on in the next line
-        counts = {delimiter: sum(map(_is_number, _cells(line, delimiter))) for delimiter in _DELIMITERS}
+        counts = {delimiter: sum(map(is_written_number, _cells(line, delimiter))) for delimiter in DELIMITERS}
         best = max(counts, key=lambda delimiter: counts[delimiter])
         if place and counts[best] >= 2 and 2 * counts[best] >= len(_filled(_cells(line, best))):
             return place, best
@@ -66,17 +65,18 @@ def _heading(rows: Sequence[Sequence[str]]) -> int:
     width = len(rows[-1])
     for place, row in enumerate(rows[:-1]):
         filled = _filled(row)
-        if len(row) == width and 2 * len(filled) >= width and len(filled) > 1 and not any(map(_is_number, filled)):
+        if (
+            len(row) == width
+            and 2 * len(filled) >= width
+            and len(filled) > 1
+            and not any(map(is_written_number, filled))
+        ):
             return place
     return 0
 
 
 def _filled(cells: Sequence[str]) -> list[str]:
     return [cell for cell in cells if cell.strip()]
-
-
-def _is_number(cell: str) -> bool:
-    return _NUMBER.fullmatch(cell) is not None
 
 
 def _cells(line: str, delimiter: str) -> list[str]:

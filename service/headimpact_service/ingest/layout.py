@@ -43,6 +43,11 @@ class SignalLayout:
     full_scale: float | None = None
 
     @property
+    def is_apart(self) -> bool:
+        """Whether it has times or a rate of its own."""
+        return self.clock is not None or self.sample_rate_hz is not None
+
+    @property
     def columns(self) -> list[int]:
         """The columns of its components."""
         return [component.column for component in self.components if component.column is not None]
@@ -107,10 +112,9 @@ class Layout:
 
     def ends_alone(self, name: SignalName) -> bool:
         """Whether a signal's rows may end before the others': it has times or a rate of its own, or others have."""
-        own = {
-            signal: laid.clock is not None or laid.sample_rate_hz is not None for signal, laid in self.signals.items()
-        }
-        return own[name] or (self.clock is None and any(own.values()))
+        if self.signals[name].is_apart:
+            return True
+        return self.clock is None and any(signal.is_apart for signal in self.signals.values())
 
     def watching(self, headings: Headings) -> Layout:
         """The same, with the columns beside it that may tell several impacts from one."""

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
-from headimpact_service.ingest.impact_json import MIN_RATE_HZ
 from headimpact_service.ingest.labels import label_fault
 from headimpact_service.ingest.layout import Layout
-from headimpact_service.ingest.unread import ROUNDED_TO_S, are_several, begins_anew, lie_apart, moment_of, span_s
+from headimpact_service.ingest.unread import are_several, begins_anew, lie_apart, longest_s, moment_of, span_s
 from headimpact_service.ingest.windows import Rows, numbers_of
 
 _OR_ONE = "; if they are one, say so by an empty group_by"
@@ -76,7 +75,7 @@ class RowLabels:
         told = dict.fromkeys(tuple(said(self.texts[column][row]) for column in columns) for row in rows)
         moments = [moment_of("T".join(parts), time_zone) for parts in told if all(parts)]
         known = [when for when in moments if when is not None]
-        if known and span_s(known) > len(rows) / MIN_RATE_HZ + ROUNDED_TO_S:
+        if known and span_s(known) > longest_s(len(rows)):
             raise self._several("The time of the impact is not the same")
 
     def _several(self, what: str, otherwise: str = "") -> Problem:

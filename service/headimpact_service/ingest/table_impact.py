@@ -210,35 +210,23 @@ class TableImpact:
         clock = signal.clock or self.layout.clock
         if self.layout.ends_alone(name) or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
-        rate = self._said_rate(signal, clock, reading, rows)
+        rate = self._said_rate(signal, reading)
         if clock is None or (rate is not None and self._stands_still(clock, rows)):
             return self._counted(Track(name, rows, rate or self.mapping.sample_rate_hz, None, 1.0))
-        return Track(name, rows, rate, self._stamps(clock.column, rows), clock.milliseconds)
+        stamps = self._stamps(clock.column, rows)
+        if rate is not None and (signal.clock is not None or not signal.is_apart):
+            _require_on_time(stamps * clock.milliseconds, rate)
+        return Track(name, rows, rate, stamps, clock.milliseconds)
 
-    def _said_rate(self, signal: SignalLayout, clock: Clock | None, reading: Reading, rows: Rows) -> float | None:
-        """The rate that the sender, the impact's row or the mapping says; 422 where its stamps say another.
+    def _said_rate(self, signal: SignalLayout, reading: Reading) -> float | None:
+        """The rate that the sender, the impact's row or the mapping says; 422 where they differ.
 
         A signal that has a rate of its own, and no times, does not go by those that the others share.
         """
         asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
         beside, own = self.options.sample_rate_hz, signal.sample_rate_hz if signal.clock is None else None
         _require_one_rate([beside, own] if own else [beside, reading.sample_rate_hz, asked])
-        if own is not None:
-            return own
-        said = beside or reading.sample_rate_hz
-        rate = said or signal.sample_rate_hz or asked
-        if rate is None or clock is None or self._stands_still(clock, rows):
-            return rate
-        stamps = self._stamps(clock.column, rows) * clock.milliseconds
-        if not follows(stamps[np.isfinite(stamps)], rate):
-            raise label_fault(
-                f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew "
-                "or are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a "
-                "mapping).",
-                "rate-differs",
-                parameter="sample_rate_hz",
-            )
-        return rate
+        return own or beside or reading.sample_rate_hz or signal.sample_rate_hz or asked
 
     def _stands_still(self, clock: Clock, rows: Rows) -> bool:
         """Whether a column of times says when the impact was, and not its samples."""
@@ -412,6 +400,17 @@ def _require_one_rate(said: Iterable[float | None]) -> None:
         raise label_fault(
             f"The impact is said to have {min(given):g} samples per second and {max(given):g}: leave out the rate that "
             "is wrong.",
+            "rate-differs",
+            parameter="sample_rate_hz",
+        )
+
+
+def _require_on_time(stamps_ms: FloatArray, rate: float) -> None:
+    """Refuse times that are not those of a rate."""
+    if not follows(stamps_ms[np.isfinite(stamps_ms)], rate):
+        raise label_fault(
+            f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew or "
+            "are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a mapping).",
             "rate-differs",
             parameter="sample_rate_hz",
         )

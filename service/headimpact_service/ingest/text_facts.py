@@ -14,7 +14,7 @@ MAX_LINE = 256 * 1024
 UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 """How a spreadsheet's "Unicode text" begins."""
 
-_DELIMITERS = (",", ";", "\t")
+DELIMITERS = (",", ";", "\t")
 _NUMBER = rb"[+-]?(?:0,[0-9]+|[0-9]+,(?:[0-9]{1,2}|[0-9]{4,}))(?:[eE][+-]?[0-9]+)?"
 _BARE = re.compile(rb"(?:^|[;\t\r\n])" + _NUMBER + rb"(?=[;\t\r\n]|$)")
 _IN_QUOTES = re.compile(rb'"' + _NUMBER + rb'"')
@@ -100,7 +100,7 @@ def unreadable(detail: str) -> Problem:
 def delimiter_of(heading: str) -> str:
     """The one separator of the headings outside quotes; where two occur, the one that occurs more often."""
     bare = re.sub(r'"[^"]*"', "", heading)
-    counts = sorted(((bare.count(delimiter), delimiter) for delimiter in _DELIMITERS), reverse=True)
+    counts = sorted(((bare.count(delimiter), delimiter) for delimiter in DELIMITERS), reverse=True)
     if counts[0][0] == 0:
         raise unreadable("The headings are not separated by commas, semicolons or tabs.")
     if counts[0][0] == counts[1][0]:

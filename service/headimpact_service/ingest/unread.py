@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import pairwise
 
-from headimpact_service.ingest.cells import said
+from headimpact_service.ingest.cells import is_written_number, said
 from headimpact_service.ingest.impact_json import MIN_RATE_HZ
 from headimpact_service.ingest.times import TimeError, instant
 
@@ -29,30 +29,14 @@ _PERSONS = frozenset({"player", "athlete", "subject", "wearer", "user", "partici
 _MEASURED = frozenset(
     {
         *("temp", "temperature", "battery", "voltage", "volt", "charge", "current", "pressure", "humidity", "force"),
-        *(
-            "is",
-            "flag",
-            "trigger",
-            "triggered",
-            "saturated",
-            "saturation",
-            "active",
-            "state",
-            "status",
-            "threshold",
-            "quality",
-            "valid",
-            "proximity",
-            "distance",
-            "light",
-        ),
+        *("saturated", "saturation", "proximity", "distance", "light", "quality", "valid", "threshold"),
+        *("is", "flag", "trigger", "triggered", "active", "state", "status"),
     }
 )
 """Words of what changes within an impact, whatever it is of: a sensor's temperature, an event's flag."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
-_NUMBER = re.compile(r"[+-]?([0-9]+[.,]?[0-9]*|[.,][0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 _WITH_PARTS = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
 _YES_OR_NO = ({"0", "1"}, {"true", "false"}, {"yes", "no"}, {"y", "n"}, {"t", "f"}, {"t", "n"})
 ROUNDED_TO_S = 1.0
@@ -108,7 +92,7 @@ def begins_anew(cells: Sequence[str]) -> bool:
 
 
 def _numbers(cells: Sequence[str]) -> list[float]:
-    return [float(cell.replace(",", ".")) for cell in map(said, cells) if _NUMBER.fullmatch(cell)]
+    return [float(cell.replace(",", ".")) for cell in map(said, cells) if is_written_number(cell)]
 
 
 def are_several(cells: Sequence[str]) -> bool:
@@ -125,8 +109,8 @@ def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:
     told = list(dict.fromkeys(filter(None, map(said, cells))))
     if len(told) < 2:
         return False
-    most = len(cells) / MIN_RATE_HZ + ROUNDED_TO_S
-    if all(map(_NUMBER.fullmatch, told)):
+    most = longest_s(len(cells))
+    if all(map(is_written_number, told)):
         stamps = _numbers(cells)
         fall = any(after < before for before, after in pairwise(stamps))
         return fall or (len(told) * STAY <= len(cells) and stamps[-1] - stamps[0] > most)
@@ -140,6 +124,11 @@ def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:
         seconds = [_seconds(clock) for clock in read]
         return len(days) > 1 or max(seconds) - min(seconds) > most
     return len(told) * STAY <= len(cells)
+
+
+def longest_s(samples: int) -> float:
+    """How long so many samples of one impact may last, by times that are rounded [s]."""
+    return samples / MIN_RATE_HZ + ROUNDED_TO_S
 
 
 def _seconds(clock: re.Match[str]) -> float:

@@ -8,8 +8,9 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import Stacked, said
+from headimpact_service.ingest.labels import label_fault
 from headimpact_service.ingest.table import Columns
 
 WINDOW_ROWS = 65_536
@@ -67,9 +68,10 @@ def _single(blocks: Iterable[Columns], max_rows: int) -> Iterator[Window]:
         held.append(block)
         count += block.rows
         if block.joined:
-            raise several(
+            raise label_fault(
                 "The headings stand again among the samples: if files of several impacts were joined, tell them apart "
-                "by a column impact_id or a mapping's group_by."
+                "by a column impact_id or a mapping's group_by.",
+                "several-impacts",
             )
         if count > max_rows:
             raise _unreadable(f"An impact may have at most {max_rows} samples; a mapping's group_by parts a file.")
@@ -195,11 +197,6 @@ def _counted(first: int, rows: int) -> int:
     if first + rows > MAX_ROWS:
         raise _unreadable(f"A file may have at most {MAX_ROWS} rows.")
     return first + rows
-
-
-def several(detail: str) -> Problem:
-    """The 422 for rows that are several impacts and do not say which is whose."""
-    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code="several-impacts")])
 
 
 def _unreadable(detail: str) -> Problem:

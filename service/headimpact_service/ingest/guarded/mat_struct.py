@@ -78,6 +78,7 @@ class StructTable:
 
 
 def is_numeric(value: Any) -> TypeGuard[AnyArray]:  # noqa: ANN401 - whatever a file holds
+    """A matrix of numbers, as MATLAB keeps columns, rows and lone ones too."""
     return isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.ndim == 2
 
 
@@ -122,6 +123,7 @@ def _of_length(values: FloatArray, length: int) -> FloatArray:
 
 
 def text_of(cell: Any) -> str:  # noqa: ANN401 - whatever a file holds
+    """The text or number of a cell that holds one; empty for anything else."""
     if isinstance(cell, np.ndarray):
         return text_of(cell.reshape(-1)[0].item()) if cell.size == 1 and cell.dtype.kind in "USfiu" else ""
     if isinstance(cell, str):
