@@ -30,9 +30,18 @@ def show(record: ImpactRecord, document: Mapping[str, Any]) -> None:
 
 
 def _heading(record: ImpactRecord, document: Mapping[str, Any]) -> str:
-    name = record.external_id or "impact"
+    name = record.external_id or _name_in_file(record.metadata)
     when = "" if record.occurred_at is None else f", {record.occurred_at:%Y-%m-%d %H:%M:%S} UTC"
     return f"{name}{when}: {document['state']} under {document['model']}"
+
+
+def _name_in_file(metadata: Mapping[str, Any]) -> str:
+    """Where an impact without a name of its own stood."""
+    file, number = metadata.get("file"), metadata.get("impact")
+    parts = [str(file)] if file is not None else []
+    if number is not None:
+        parts.append(f"impact {number}")
+    return ", ".join(parts) or "impact"
 
 
 def _peaks(document: Mapping[str, Any]) -> Text:

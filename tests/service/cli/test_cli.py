@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -113,6 +114,17 @@ class TestScore:
         code, printed, _ = run("score", str(table), "--mapping", f"@{mapping}", "--json")
         assert code == 0
         assert json.loads(printed)["peaks"]["linear_acceleration_g"] > 40
+
+    def test_impacts_without_names_are_headed_by_where_they_stood(self, run: Run, tmp_path: Path) -> None:
+        table = (Path(__file__).parents[3] / "openapi" / "examples" / "import.csv").read_text()
+        mapping = Path(__file__).parents[3] / "openapi" / "examples" / "mapping.json"
+        with zipfile.ZipFile(tmp_path / "two.zip", "w") as archive:
+            archive.writestr("first.csv", table)
+            archive.writestr("second.csv", table)
+        code, printed, failed = run("score", str(tmp_path / "two.zip"), "--mapping", f"@{mapping}")
+        assert code == 0, failed
+        headings = [line for line in printed.splitlines() if ": scored under" in line]
+        assert [heading.split(":")[0] for heading in headings] == ["first.csv", "second.csv"]
 
     @pytest.mark.parametrize("text", [None, "", "nonsense", "{", "[]"])
     def test_a_file_that_cannot_be_read_is_one_line_and_exit_code_2(
