@@ -76,7 +76,10 @@ class AthleteList(BaseModel):
 class AthleteQuery(SyncQuery):
     """Which athletes."""
 
-    external_id: Annotated[str | None, Field(min_length=1, max_length=200, description="Your id of one.")] = None
+    external_id: Annotated[
+        str | None,
+        Field(min_length=1, max_length=200, description="Your id of one, also one that was merged into another."),
+    ] = None
 
 
 ETAG = {"ETag": "The revision, for If-Match."}

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any, Literal
 
-from sqlalchemy import Connection, RowMapping, bindparam, delete, insert, select, update
+from sqlalchemy import Connection, RowMapping, bindparam, delete, insert, or_, select, update
 
 from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import erasure, ids, labels
@@ -131,10 +131,15 @@ def page(
     limit: int = 100,
     after: Position | None = None,
 ) -> Page[Athlete]:
-    """A page of the list: newest first, or by change with tombstones if `updated_since` is given."""
+    """A page of the list: newest first, or by change with tombstones if `updated_since` is given.
+
+    Who bears an external id is also the athlete whom that one was merged into.
+    """
     query = _ATHLETE
     if external_id is not None:
-        query = query.where(athletes.c.external_id == external_id)
+        named = athletes.c.external_id == external_id
+        merged = select(athletes.c.merged_into).where(athletes.c.data_set_id == data_set_id, named).scalar_subquery()
+        query = query.where(or_(named, athletes.c.id == merged))
     query = keyset(query, athletes, updated_since=updated_since, after=after, limit=limit)
     rows = conn.execute(query, {"data_set_id": data_set_id}).mappings()
     return page_of([_athlete(row) for row in rows], limit)

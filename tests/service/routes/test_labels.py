@@ -365,6 +365,16 @@ class TestMoves:
         assert again.status_code == 200
         assert api.post("/v1/athletes", json={"external_id": "p-17b"}).status_code == 409
 
+    def test_a_merged_name_is_found_as_the_athlete_who_stayed(self, api: Api) -> None:
+        one, two = in_session(api, "e-1", 1.0, "p-17"), in_session(api, "e-2", 2.0, "p-17b")
+        source, target = athlete_of(api, two), athlete_of(api, one)
+        api.post(f"/v1/athletes/{source}/merge", json={"into": target})
+        found = {
+            name: [row["id"] for row in api.get("/v1/athletes", params={"external_id": name}).json()["data"]]
+            for name in ("p-17", "p-17b", "p-17c")
+        }
+        assert found == {"p-17": [target], "p-17b": [target], "p-17c": []}
+
     def test_whoever_follows_the_athletes_sees_where_one_went(self, api: Api) -> None:
         one, two = in_session(api, "e-1", 1.0, "p-17"), in_session(api, "e-2", 2.0, "p-17b")
         source, target = athlete_of(api, two), athlete_of(api, one)
