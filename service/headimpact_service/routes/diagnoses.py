@@ -12,6 +12,9 @@ from headimpact_service import deps
 from headimpact_service.answers import answer
 from headimpact_service.ingest.impact_json import Moment, Name, Strict, Text
 from headimpact_service.operation import Answer, Call, Routes
+from headimpact_service.parameters import ListQuery
+from headimpact_service.routes.lists import MEDIA_TYPES, answer_list
+from headimpact_service.routes.short_lists import short_listing
 from headimpact_service.store import diagnoses, ids
 from headimpact_service.store.diagnoses import Diagnosis, NewDiagnosis
 from headimpact_service.store.labels import Basis
@@ -45,10 +48,10 @@ class DiagnosisView(BaseModel):
 
 
 class DiagnosisList(BaseModel):
-    """All diagnoses of an athlete, on one page."""
+    """A page of an athlete's diagnoses, oldest first."""
 
     data: list[DiagnosisView]
-    next_cursor: None
+    next_cursor: str | None
 
 
 @routes(
@@ -85,14 +88,22 @@ async def report_diagnosis(call: Call) -> Response:
     "/v1/athletes/{athlete_id}/diagnoses",
     "List an athlete's diagnoses",
     "labels:read",
-    {200: Answer(DiagnosisList, "All of them, oldest first.")},
-    problems=("not-found",),
+    {200: Answer(DiagnosisList, "A page of them, oldest first.", MEDIA_TYPES)},
+    query=ListQuery,
+    problems=("not-found", "bad-cursor"),
 )
 async def list_diagnoses(call: Call) -> Response:
     """Those whose label was taken back or replaced later too: the impact's label is what holds."""
     athlete_id = _athlete(call)
-    found = await deps.read(call.request, lambda conn: diagnoses.of_athlete(conn, call.data_set_id, athlete_id))
-    return answer({"data": [_document(one) for one in found], "next_cursor": None})
+
+    listing = short_listing(
+        f"diagnoses {athlete_id.hex()}",
+        lambda conn: diagnoses.of_athlete(conn, call.data_set_id, athlete_id),
+        _document,
+        "id",
+        tuple(DiagnosisView.model_fields),
+    )
+    return await answer_list(call, listing, call.query)
 
 
 def _athlete(call: Call) -> bytes:

@@ -21,11 +21,14 @@ from headimpact_service.intake.registry import model_of
 from headimpact_service.intake.rendering import brain_trace, head_traces, new_score, score_document
 from headimpact_service.intake.scoring import Terms, operating_points, score_record
 from headimpact_service.operation import Answer, Call, Routes
-from headimpact_service.parameters import Query
+from headimpact_service.parameters import ListQuery, Query
+from headimpact_service.routes.impact_shapes import SCORE_COLUMNS, SCORE_NUMBERS, score_cells
 from headimpact_service.routes.impacts import identifier, present
+from headimpact_service.routes.lists import MEDIA_TYPES, answer_list
 from headimpact_service.routes.models import Version
 from headimpact_service.routes.operating_points import requests_of
 from headimpact_service.routes.score_shapes import ScoreView, Shape, TraceView
+from headimpact_service.routes.short_lists import short_listing
 from headimpact_service.store import impacts, scores, traces
 from headimpact_service.store.impact_rows import Impact
 from headimpact_service.store.score_rows import Score
@@ -149,10 +152,10 @@ class StoredScoreView(ScoreView):
 
 
 class StoredScoreList(Shape):
-    """Every score of an impact, oldest first."""
+    """A page of an impact's scores, oldest first."""
 
     data: list[StoredScoreView]
-    next_cursor: None
+    next_cursor: str | None
 
 
 class NewScoreBody(Strict):
@@ -169,16 +172,25 @@ class NewScoreBody(Strict):
     "/v1/impacts/{impact_id}/scores",
     "List an impact's scores",
     "impacts:read",
-    {200: Answer(StoredScoreList, "All scores, on one page.")},
-    problems=("not-found",),
+    {200: Answer(StoredScoreList, "A page of scores, oldest first.", MEDIA_TYPES)},
+    query=ListQuery,
+    problems=("not-found", "bad-cursor"),
 )
 async def list_scores(call: Call) -> Response:
     """Those of revisions before and of other models too."""
     impact = await present(call)
-    found = await deps.read(call.request, lambda conn: scores.list_all(conn, call.data_set_id, impact.id))
     current = None if impact.score is None else impact.score.number
-    documents = [_document(score, current=score.number == current) for score in found]
-    return answer({"data": documents, "next_cursor": None})
+    listing = short_listing(
+        f"scores {impact.id.hex()}",
+        lambda conn: scores.list_all(conn, call.data_set_id, impact.id),
+        lambda score: _document(score, current=score.number == current),
+        "number",
+        (*_PLACE, *SCORE_COLUMNS),
+        cells=lambda score: [*_place(score, current=score.number == current).values(), *score_cells(score)],
+        numbers=SCORE_NUMBERS,
+        flags=frozenset({"current"}),
+    )
+    return await answer_list(call, listing, call.query)
 
 
 @routes(
@@ -227,6 +239,13 @@ def _scored_again(impact: Impact, stored: bytes, terms: Terms, extra: tuple[str,
     return new_score(score_record(record, terms))
 
 
+_PLACE = ("number", "revision", "current", "created_at")
+
+
 def _document(score: Score, *, current: bool) -> dict[str, Any]:
-    place = {"number": score.number, "revision": score.revision, "current": current, "created_at": score.created_at}
-    return score_document(score) | place
+    return score_document(score) | _place(score, current=current)
+
+
+def _place(score: Score, *, current: bool) -> dict[str, Any]:
+    """The members of :data:`_PLACE`."""
+    return dict(zip(_PLACE, (score.number, score.revision, current, score.created_at), strict=True))

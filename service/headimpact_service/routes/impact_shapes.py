@@ -146,6 +146,18 @@ def _score(impact: Impact, score: Score) -> dict[str, Any]:
 
 
 _REST = tuple(name for name in CONTEXT if name not in {"session_id", "activity", "sport", "position"})
+SCORE_COLUMNS = (
+    "state",
+    "model",
+    "incidence",
+    *VALUE_COLUMNS,
+    *PROBABILITY_COLUMNS,
+    "brain_angle_resultant",
+    "peak_resultant_linear_acceleration_g",
+    "peak_resultant_angular_velocity_rad_s",
+    "peak_resultant_angular_acceleration_rad_s2",
+)
+"""Of a score as a part of a row."""
 COLUMNS = (
     "id",
     "external_id",
@@ -158,15 +170,7 @@ COLUMNS = (
     "activity",
     "sport",
     "position",
-    "state",
-    "model",
-    "incidence",
-    *VALUE_COLUMNS,
-    *PROBABILITY_COLUMNS,
-    "brain_angle_resultant",
-    "peak_resultant_linear_acceleration_g",
-    "peak_resultant_angular_velocity_rad_s",
-    "peak_resultant_angular_acceleration_rad_s2",
+    *SCORE_COLUMNS,
     "quality_codes",
     "duplicate_of",
     "input_digest",
@@ -182,15 +186,8 @@ COLUMNS = (
 
 `outcome` and `event` are empty as long as nobody has labelled the impact, and for a key that may not read labels.
 """
-NUMBERS = CONTEXT_NUMBERS | {
-    "incidence",
-    *VALUE_COLUMNS,
-    *PROBABILITY_COLUMNS,
-    "brain_angle_resultant",
-    "peak_resultant_linear_acceleration_g",
-    "peak_resultant_angular_velocity_rad_s",
-    "peak_resultant_angular_acceleration_rad_s2",
-}
+SCORE_NUMBERS = frozenset(SCORE_COLUMNS) - {"state", "model"}
+NUMBERS = CONTEXT_NUMBERS | SCORE_NUMBERS
 """Those of :data:`COLUMNS` that hold numbers."""
 
 
@@ -208,7 +205,7 @@ def impact_cells(impact: Impact) -> list[Cell]:
         impact.activity,
         impact.sport,
         impact.position,
-        *(_NO_SCORE if impact.score is None else _score_cells(impact.score)),
+        *(_NO_SCORE if impact.score is None else score_cells(impact.score)),
         _quality_codes(impact),
         None if impact.duplicate_of is None else ids.encode("imp", impact.duplicate_of),
         None if impact.input_digest is None else shown(impact.input_digest),
@@ -222,10 +219,11 @@ def impact_cells(impact: Impact) -> list[Cell]:
     ]
 
 
-_NO_SCORE: list[Cell] = [None] * (7 + len(VALUE_COLUMNS) + len(PROBABILITY_COLUMNS))
+_NO_SCORE: list[Cell] = [None] * len(SCORE_COLUMNS)
 
 
-def _score_cells(score: Score) -> list[Cell]:
+def score_cells(score: Score) -> list[Cell]:
+    """The cells of :data:`SCORE_COLUMNS`."""
     values: list[Cell] = []
     for key, columns in CRITERION_COLUMNS.items():
         value = score.values.get(key)

@@ -17,11 +17,13 @@ from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.upload import read_upload, sample_count
 from headimpact_service.intake.importing import Found, preview_row, summary
 from headimpact_service.operation import ANY_KEY, Answer, BodyForm, Call, Routes
-from headimpact_service.parameters import Flag, Query, validate_parameters
+from headimpact_service.parameters import Flag, ListQuery, Query, validate_parameters
 from headimpact_service.routes.import_flow import score_all, store_all
 from headimpact_service.routes.import_jobs import earlier_job, order_import, wants_job
 from headimpact_service.routes.import_shapes import ImportView
 from headimpact_service.routes.job_shapes import IDEMPOTENCY_KEY, LOCATION, PREFER, JobView, accepted
+from headimpact_service.routes.lists import MEDIA_TYPES, answer_list
+from headimpact_service.routes.short_lists import short_listing
 from headimpact_service.routes.uploads import MULTIPART, RAW, Upload, received
 
 routes = Routes("imports")
@@ -70,10 +72,10 @@ class ImportForm(BaseModel):
 
 
 class PresetList(BaseModel):
-    """Every preset, on one page."""
+    """A page of presets."""
 
     data: list[dict[str, Any]]
-    next_cursor: None
+    next_cursor: str | None
 
 
 @routes(
@@ -129,7 +131,25 @@ def _read(upload: Upload, options: ImportOptions) -> Found | None:
     return found
 
 
-@routes("GET", "/v1/presets", "List known layouts", ANY_KEY, {200: Answer(PresetList, "All presets.")})
-async def list_known_presets(call: Call) -> Response:  # noqa: ARG001 - the shape of a handler
+@routes(
+    "GET",
+    "/v1/presets",
+    "List known layouts",
+    ANY_KEY,
+    {200: Answer(PresetList, "A page of presets.", MEDIA_TYPES)},
+    query=ListQuery,
+    problems=("bad-cursor",),
+)
+async def list_known_presets(call: Call) -> Response:
     """Columns, units and axes of known devices, and what the sender must add."""
-    return answer({"data": list_presets(), "next_cursor": None})
+    known = list_presets()
+    listing = short_listing(
+        "presets",
+        lambda conn: known,  # noqa: ARG005 - presets are no rows of the database
+        dict,
+        "name",
+        tuple(known[0]),
+        numbers=frozenset({"sample_rate_hz", "pre_trigger_ms"}),
+        flags=frozenset({"recognised"}),
+    )
+    return await answer_list(call, listing, call.query)

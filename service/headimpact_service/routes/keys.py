@@ -13,6 +13,9 @@ from headimpact_service.answers import answer, no_content
 from headimpact_service.errors import Problem, not_found
 from headimpact_service.ingest.impact_json import Name, Strict
 from headimpact_service.operation import ANY_KEY, Answer, Call, Routes
+from headimpact_service.parameters import ListQuery
+from headimpact_service.routes.lists import MEDIA_TYPES, answer_list
+from headimpact_service.routes.short_lists import short_listing
 from headimpact_service.store import ids, keys
 
 routes = Routes("keys")
@@ -43,10 +46,10 @@ class NewKeyView(KeyView):
 
 
 class KeyListView(BaseModel):
-    """Every key of the organisation, newest first."""
+    """A page of the organisation's keys, newest first."""
 
     data: list[KeyView]
-    next_cursor: None
+    next_cursor: str | None
 
 
 class CallerView(BaseModel):
@@ -73,12 +76,23 @@ async def read_me(call: Call) -> Response:
     return answer({"organisation": call.key.organisation_name, "mode": call.key.mode, "key": document(call.key)})
 
 
-@routes("GET", "/v1/keys", "The organisation's keys", "admin", {200: Answer(KeyListView, "All keys, on one page.")})
+@routes(
+    "GET",
+    "/v1/keys",
+    "The organisation's keys",
+    "admin",
+    {200: Answer(KeyListView, "A page of keys, newest first.", MEDIA_TYPES)},
+    query=ListQuery,
+    problems=("bad-cursor",),
+)
 async def list_keys(call: Call) -> Response:
     """Revoked keys stay listed; secrets are never shown again. A test key sees test keys only."""
-    found = await deps.read(call.request, lambda conn: keys.list_keys(conn, call.key.organisation_id))
-    shown = [document(key) for key in found if _within_reach(call, key)]
-    return answer({"data": shown, "next_cursor": None})
+
+    def read(conn: Any) -> list[keys.KeyRow]:  # noqa: ANN401 - a connection of the store
+        return [key for key in keys.list_keys(conn, call.key.organisation_id) if _within_reach(call, key)]
+
+    listing = short_listing("keys", read, document, "id", tuple(KeyView.model_fields))
+    return await answer_list(call, listing, call.query)
 
 
 @routes(

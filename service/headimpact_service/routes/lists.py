@@ -24,8 +24,8 @@ PAGE_OF_TABLE = 1000
 """Rows that a table reads at a time, so that no reader holds the database for long."""
 
 NEXT_CURSOR = "X-Next-Cursor"
-_INTEGERS = frozenset({"revision", "birth_year", "done", "total"})
-_INSTANTS = "_at"
+_INTEGERS = frozenset({"revision", "birth_year", "done", "total", "number", "drop_rows"})
+_INSTANTS = ("_at", "_due", "_fired")
 """How the names of columns of times end, of every list."""
 
 

@@ -94,10 +94,10 @@ class ModelView(ModelSummary):
 
 
 class ModelList(BaseModel):
-    """Every model that the caller can use."""
+    """A page of the models that the caller can use."""
 
     data: list[ModelSummary]
-    next_cursor: None
+    next_cursor: str | None
 
 
 def summary(model: RiskModel, stored: StoredModel | None, aliases: Mapping[str, str | None]) -> dict[str, Any]:

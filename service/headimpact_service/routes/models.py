@@ -23,9 +23,11 @@ from headimpact_service.errors import PayloadError, Problem, invalid_parameter, 
 from headimpact_service.ingest.impact_json import Incidence, Strict, Text
 from headimpact_service.intake import registry
 from headimpact_service.operation import Answer, BodyForm, Call, Routes
-from headimpact_service.parameters import Query
+from headimpact_service.parameters import ListQuery, Query
+from headimpact_service.routes.lists import MEDIA_TYPES, answer_list
 from headimpact_service.routes.model_shapes import (
     ModelList,
+    ModelSummary,
     ModelView,
     curve_document,
     metrics_of,
@@ -33,6 +35,7 @@ from headimpact_service.routes.model_shapes import (
     summary,
 )
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
+from headimpact_service.routes.short_lists import short_listing
 from headimpact_service.store import aliases, ids, models
 from headimpact_service.store.aliases import Alias, AliasName
 from headimpact_service.store.models import NewModel, StoredModel
@@ -119,16 +122,26 @@ class AliasBody(Strict):
 ETAG = {"ETag": "The revision, for If-Match."}
 
 
-@routes("GET", "/v1/models", "List risk models", "models:read", {200: Answer(ModelList, "All models, on one page.")})
+@routes(
+    "GET",
+    "/v1/models",
+    "List risk models",
+    "models:read",
+    {200: Answer(ModelList, "A page of models.", MEDIA_TYPES)},
+    query=ListQuery,
+    problems=("bad-cursor",),
+)
 async def list_models(call: Call) -> Response:
     """Those of the data set, newest first, and the published one."""
-    found, meant = await deps.read(
-        call.request, lambda conn: (models.list_all(conn, call.data_set_id), _meant(conn, call.data_set_id))
-    )
-    own = [summary(model_from_document(stored.document), stored, meant) for stored in found]
-    return answer(
-        {"data": own + [summary(model, None, meant) for model in PUBLISHED_MODELS.values()], "next_cursor": None}
-    )
+
+    def read(conn: Any) -> list[dict[str, Any]]:  # noqa: ANN401 - a connection of the store
+        found, meant = models.list_all(conn, call.data_set_id), _meant(conn, call.data_set_id)
+        own = [summary(model_from_document(stored.document), stored, meant) for stored in found]
+        return own + [summary(model, None, meant) for model in PUBLISHED_MODELS.values()]
+
+    columns = tuple(ModelSummary.model_fields)
+    listing = short_listing("models", read, dict, "version", columns, numbers=frozenset({"incidence"}))
+    return await answer_list(call, listing, call.query)
 
 
 @routes(

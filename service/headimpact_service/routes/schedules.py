@@ -15,9 +15,12 @@ from headimpact_service.errors import invalid_parameter, not_found
 from headimpact_service.ingest.impact_json import Strict, Zone
 from headimpact_service.intake.cron import next_due, require_cron
 from headimpact_service.operation import Answer, Call, Routes
+from headimpact_service.parameters import ListQuery
 from headimpact_service.routes.fit_shapes import FitBody, GatesBody, stored
+from headimpact_service.routes.lists import MEDIA_TYPES, answer_list
 from headimpact_service.routes.models import VERSION
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
+from headimpact_service.routes.short_lists import short_listing
 from headimpact_service.store import ids, schedules
 from headimpact_service.store.schedules import NewSchedule, Schedule
 
@@ -74,20 +77,39 @@ class ScheduleView(BaseModel):
 
 
 class ScheduleList(BaseModel):
-    """All schedules, on one page."""
+    """A page of schedules, by name."""
 
     data: list[ScheduleView]
-    next_cursor: None
+    next_cursor: str | None
 
 
 ETAG = {"ETag": "The revision, for If-Match."}
 
 
-@routes("GET", "/v1/schedules", "List schedules", "models:read", {200: Answer(ScheduleList, "All schedules, by name.")})
+_FLAGS = frozenset({"enabled", "promote"})
+
+
+@routes(
+    "GET",
+    "/v1/schedules",
+    "List schedules",
+    "models:read",
+    {200: Answer(ScheduleList, "A page of schedules, by name.", MEDIA_TYPES)},
+    query=ListQuery,
+    problems=("bad-cursor",),
+)
 async def list_schedules(call: Call) -> Response:
     """With when each is due next."""
-    found = await deps.read(call.request, lambda conn: schedules.list_all(conn, call.data_set_id))
-    return answer({"data": [_document(one) for one in found], "next_cursor": None})
+
+    listing = short_listing(
+        "schedules",
+        lambda conn: schedules.list_all(conn, call.data_set_id),
+        _document,
+        "name",
+        tuple(ScheduleView.model_fields),
+        flags=_FLAGS,
+    )
+    return await answer_list(call, listing, call.query)
 
 
 @routes(
