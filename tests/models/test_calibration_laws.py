@@ -41,6 +41,23 @@ def drawn(seed: int, n: int = 300, p: int = 3) -> Sample:
     return Sample((generator.random(n) < expit(eta)).astype(float), x)
 
 
+def with_outlier() -> Sample:
+    """A predictor of small values but for one event's, which is a hundred standard deviations away."""
+    generator = np.random.default_rng(3)
+    x = generator.gamma(2.0, 0.001, 600)
+    y = (generator.random(600) < expit(-4.5 + 1200.0 * x)).astype(float)
+    x[0], y[0] = 1.0, 1.0
+    return Sample(y, x[:, None])
+
+
+def penalised(sample: Sample, coefficients: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    """Firth's penalised log-likelihood by its definition."""
+    eta = sample.design @ coefficients
+    p = expit(eta)
+    sign, log_determinant = np.linalg.slogdet((sample.design.T * (p * (1 - p))) @ sample.design)
+    return float((sample.y * eta - np.logaddexp(0, eta)).sum() + 0.5 * log_determinant) if sign > 0 else -np.inf
+
+
 def cohort_of(seed: int = 1, n: int = 400) -> Cohort:
     """A cohort with two criteria and forty athletes."""
     generator = np.random.default_rng(seed)
@@ -150,6 +167,17 @@ class TestFits:
         found = fit_firth(Sample(y, np.zeros((10, 0))))
         assert expit(found.coefficients[0]) == pytest.approx(1.5 / 11, rel=1e-9)
 
+    def test_firth_climbs_the_higher_hill_where_an_outlier_makes_two(self) -> None:
+        sample = with_outlier()
+        found = fit_firth(sample)
+        slopes = np.linspace(-50.0, 3.0 * found.coefficients[1], 400)
+        intercepts = np.linspace(-8.0, 2.0, 101)
+        highest = max(penalised(sample, np.array([a, b])) for a in intercepts for b in slopes)
+        assert found.penalised_log_likelihood >= highest
+        assert found.penalised_log_likelihood == pytest.approx(penalised(sample, found.coefficients), rel=1e-9)
+        low, high, _ = found.profile(1)
+        assert low < found.coefficients[1] < high
+
     def test_prior_correction_to_the_samples_own_share_changes_nothing(self) -> None:
         b = np.array([-3.0, 2.0])
         assert prior_corrected(b, 0.03, 0.03) == pytest.approx(b)
@@ -257,6 +285,13 @@ class TestAgreement:
         sample = drawn(5)
         etas = np.stack([fit(sample).linear_predictor * factor for factor in (0.5, 1.0, 3.0)], axis=1)
         assert slopes_on(sample.y, etas) == pytest.approx([2.0, 1.0, 1 / 3], rel=1e-8)
+
+    def test_an_outlier_does_not_take_a_slope_away(self) -> None:
+        """The slope of an outcome on a multiple of its own linear predictor is one over the factor, however far."""
+        sample = with_outlier()
+        eta = fit(sample).linear_predictor
+        assert np.abs(eta).max() > 500
+        assert slopes_on(sample.y, np.stack([2.0 * eta, 0.25 * eta], axis=1)) == pytest.approx([0.5, 4.0], rel=1e-8)
 
     def test_weights_to_the_incidence_agree_with_a_prior_corrected_model(self) -> None:
         sample = drawn(6, n=4000)
@@ -502,6 +537,14 @@ class TestFittedModels:
         assert not isinstance(one.closed_test, str)
         assert one.closed_test is not None
         assert one.closed_test.chosen == "original"
+
+    def test_a_profile_without_an_end_takes_nothing_else_from_the_report(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("headimpact.calibration.firth.MAX_STEPS", 1)
+        options = RefitOptions(criteria=("bric",), bias_correction="firth", replicas=0)
+        firth = report_document(refit(cohort_of(), options))["criteria"]["bric"]["firth"]
+        assert firth["profile_intervals"] == firth["profile_p"] == {"intercept": None, "value": None}
+        assert set(firth["profile_reasons"]) == {"intercept", "value"}
+        assert firth["coefficients"]["value"] > 0
 
     def test_without_replicas_there_are_no_bootstrap_intervals(self) -> None:
         found = report_document(refit(cohort_of(), RefitOptions(replicas=0)))

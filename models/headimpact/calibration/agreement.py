@@ -112,7 +112,12 @@ def slopes_on(y: FloatArray, linear_predictors: FloatArray) -> FloatArray:
         _slopes(y[:, None], linear_predictors[:, first : first + BLOCK])
         for first in range(0, linear_predictors.shape[1], BLOCK)
     ]
-    return np.concatenate(blocks) if blocks else np.zeros(0)
+    slopes = np.concatenate(blocks) if blocks else np.zeros(0)
+    for b in np.flatnonzero(np.isnan(slopes)).tolist():  # an outlier needs longer steps than many take together
+        alone = recalibration(y, linear_predictors[:, b])
+        if alone is not None:
+            slopes[b] = alone.coefficients[1]
+    return slopes
 
 
 def _slopes(outcome: FloatArray, eta: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ every impact counts 1/2 h_i more for each outcome, h_i being its leverage.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.special import expit
 from scipy.stats import chi2
 
-from headimpact.calibration.logistic import BoolArray, FloatArray, Sample, require_fittable
+from headimpact.calibration.logistic import BoolArray, FloatArray, Sample, fit, require_fittable
 from headimpact.errors import CalibrationError
 
 TOLERANCE = 1e-11
@@ -105,6 +106,9 @@ class FirthFit:
 def fit_firth(sample: Sample) -> FirthFit:
     """Maximise Firth's penalised likelihood.
 
+    An outlier gives it a second, lower hill near 0, so the search begins there and, where there is one, at the maximum
+    of the likelihood itself; the higher of what they find is the answer.
+
     Raises
     ------
     CalibrationError
@@ -112,7 +116,7 @@ def fit_firth(sample: Sample) -> FirthFit:
     """
     require_fittable(sample)
     design, k = sample.design / sample.scale, sample.design.shape[1]
-    found = _maximised(design, sample.y, np.zeros(k), np.ones(k, dtype=bool))
+    found = _highest(design, sample.y, [np.zeros(k), *_without_penalty(sample)])
     # without slopes, the penalty still being that of the whole design
     null = _maximised(design, sample.y, np.zeros(k), np.arange(k) == 0)
     # the information of scaled columns has a determinant smaller by the square of each scale
@@ -123,6 +127,24 @@ def fit_firth(sample: Sample) -> FirthFit:
         found.penalised_log_likelihood + unscaled,
         null.penalised_log_likelihood + unscaled,
     )
+
+
+def _without_penalty(sample: Sample) -> list[FloatArray]:
+    """The scaled coefficients of maximum likelihood, if there are any."""
+    found = fit(sample)
+    return [found.coefficients * sample.scale] if found.converged else []
+
+
+def _highest(design: FloatArray, y: FloatArray, starts: Sequence[FloatArray]) -> _State:
+    """The highest of the maxima that searches from some starts find."""
+    found: list[_State] = []
+    for start in starts:
+        try:
+            found.append(_maximised(design, y, start, np.ones(start.size, dtype=bool)))
+        except CalibrationError:
+            if start is starts[-1] and not found:
+                raise
+    return max(found, key=lambda state: state.penalised_log_likelihood)
 
 
 @dataclass(frozen=True)

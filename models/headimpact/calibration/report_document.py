@@ -10,6 +10,7 @@ from scipy.special import expit
 
 from headimpact.calibration.agreement import Agreement, hosmer_lemeshow, spiegelhalter
 from headimpact.calibration.criterion_refit import Bootstrap, CriterionRefit, Threshold
+from headimpact.calibration.firth import FirthFit, Profile
 from headimpact.calibration.logistic import FloatArray
 from headimpact.calibration.rare_events import prior_offset
 from headimpact.calibration.refit import Comparison, Refit, coefficient_names
@@ -19,6 +20,7 @@ from headimpact.calibration.thresholds import Confusion
 from headimpact.calibration.update import ChiSquareTest, ClosedTest
 from headimpact.calibration.validation import Optimism, OutOfFold
 from headimpact.criteria import BY_KEY
+from headimpact.errors import CalibrationError
 
 FORMAT = "headimpact-refit/1"
 
@@ -161,7 +163,7 @@ def _test(test: ChiSquareTest) -> dict[str, Any]:
 def _firth(one: CriterionRefit, names: list[str]) -> dict[str, Any]:
     if one.firth is None:
         return {}
-    profiles = [one.firth.profile(i) for i in range(len(names))]
+    profiles = {name: _profile(one.firth, i) for i, name in enumerate(names)}
     return {
         "firth": {
             "coefficients": _named(names, one.firth.coefficients),
@@ -169,12 +171,21 @@ def _firth(one: CriterionRefit, names: list[str]) -> dict[str, Any]:
             "information_covariance": one.firth.information_covariance.tolist(),
             "penalised_log_likelihood": one.firth.penalised_log_likelihood,
             "profile_intervals": {
-                name: [profile.low, profile.high] for name, profile in zip(names, profiles, strict=True)
+                name: None if isinstance(found, str) else [found.low, found.high] for name, found in profiles.items()
             },
-            "profile_p": {name: profile.p for name, profile in zip(names, profiles, strict=True)},
+            "profile_p": {name: None if isinstance(found, str) else found.p for name, found in profiles.items()},
+            "profile_reasons": {name: found for name, found in profiles.items() if isinstance(found, str)},
             "calibrated_intercept": float(one.firth.with_calibrated_intercept[0]),
         }
     }
+
+
+def _profile(found: FirthFit, which: int) -> Profile | str:
+    """The profile of a coefficient, or why it has none."""
+    try:
+        return found.profile(which)
+    except CalibrationError as error:
+        return str(error)
 
 
 def _auc(one: CriterionRefit, level: float, found: Refit) -> dict[str, Any]:
@@ -242,7 +253,12 @@ def _optimism(done: Optimism | str) -> dict[str, Any]:
         return {"optimism_corrected_auc": None, "optimism": {"reason": done}}
     return {
         "optimism_corrected_auc": done.corrected_auc,
-        "optimism": {"auc": done.optimism, "calibration_slope": done.calibration_slope, "failed": done.failed},
+        "optimism": {
+            "auc": done.optimism,
+            "calibration_slope": done.calibration_slope,
+            "failed": done.failed,
+            "without_slope": done.without_slope,
+        },
     }
 
 

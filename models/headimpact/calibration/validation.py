@@ -131,6 +131,8 @@ class Optimism:
         One by one, B; NaN where a resample could not be fitted.
     failed
         How many could not.
+    without_slope
+        How many of the others have no calibration slope.
     """
 
     apparent_auc: float
@@ -140,6 +142,7 @@ class Optimism:
     auc_on_sample: FloatArray
     slopes: FloatArray
     failed: int
+    without_slope: int
 
     @property
     def corrected_auc(self) -> float:
@@ -178,4 +181,5 @@ def optimism(sample: Sample, counts: Counts, coefficients: FloatArray, usable: N
         outside,
         slopes,
         int((~known).sum()),
+        int((known & ~np.isfinite(slopes)).sum()),
     )
