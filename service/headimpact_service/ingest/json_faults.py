@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from math import isfinite
@@ -147,6 +148,28 @@ def _holds(node: Any, step: object) -> bool:  # noqa: ANN401 - any JSON
     return isinstance(node, list) and isinstance(step, int) and step < len(node)
 
 
+_REASONS = (
+    ("recursion limit", "it is nested too deeply"),
+    ("EOF", "it ends before it is complete"),
+    ("trailing characters", "something stands behind its end"),
+    ("trailing comma", "a comma stands before a closing bracket"),
+    ("key must be a string", "a member's name is no text in double quotes"),
+    ("control character", "a text holds a control character that is not escaped"),
+    ("escape", "a text holds an escape that JSON does not have"),
+    ("surrogate", "a text holds half a surrogate pair"),
+    ("unicode", "a text is not UTF-8"),
+    ("number", "a number is not written as JSON has it"),
+    ("expected `,`", "a comma or a closing bracket is missing"),
+    ("expected `:`", "a colon is missing"),
+    ("expected", "there is no value where one is expected"),
+)
+"""What the parser's messages hold, and what is said for it."""
+_PLACE = re.compile(r"at line (\d+) column (\d+)", re.ASCII)
+
+
 def _reason(fault: ErrorDetails) -> str:
-    """The parser's words: they say what and where, and hold nothing of the text itself."""
-    return str(fault.get("ctx", {}).get("error", "reading stopped"))
+    """What is wrong with the text, and where."""
+    told = str(fault.get("ctx", {}).get("error", ""))
+    reason = next((words for part, words in _REASONS if part in told), "it is not well formed")
+    place = _PLACE.search(told)
+    return reason if place is None else f"{reason} (line {place[1]}, column {place[2]})"

@@ -79,7 +79,7 @@ def test_numbers_that_are_not_finite_or_no_numbers_are_refused_in_files_too():
     [
         (b"{", "not JSON"),
         (b"[" * 10_000, "is not closed"),
-        (b"[" * 500 + b"]" * 500, "recursion limit"),
+        (b"[" * 500 + b"]" * 500, "nested too deeply"),
         (b'[{"a": 1}', "or the end of the list"),
         (b'[{"a": 1},]', "or the end of the list"),
         (b'[{"a": 1} {"a": 1}]', "or the end of the list"),
