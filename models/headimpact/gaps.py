@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from headimpact.published import QUALITY_LIMITS
 from headimpact.recording import FloatArray, Signal
+from headimpact.stamps import is_like
 
 BoolArray = NDArray[np.bool_]
 
@@ -59,7 +60,7 @@ def _absent_samples(signal: Signal) -> tuple[Signal, int]:
     if not 0.0 < median < np.inf:
         return signal, 0
     parts = np.rint(steps / median)
-    regular = np.abs(steps / np.maximum(parts, 1.0) - median) <= QUALITY_LIMITS["record"]["maximum_jitter"] * median
+    regular = is_like(steps / np.maximum(parts, 1.0), median, signal.time_s)
     gaps = (parts >= 2) & (parts <= QUALITY_LIMITS["gaps"]["maximum_samples"] + 1) & regular
     if not gaps.any():
         return signal, 0

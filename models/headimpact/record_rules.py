@@ -16,7 +16,7 @@ from headimpact.kinematics import FloatArray
 from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import AXES, words
 from headimpact.recording import TO_CRITERIA_UNIT, Recording, Signal, SignalName
-from headimpact.stamps import rate_said
+from headimpact.stamps import is_like, rate_said
 
 UNITS_OF: dict[str, tuple[str, str]] = {
     "linear_acceleration": ("g", "m/s^2"),
@@ -119,7 +119,7 @@ def _faults_of_stamps(name: SignalName, time_s: FloatArray) -> Iterator[TraceErr
         return
     bound = QUALITY_LIMITS["record"]["maximum_jitter"]
     median = float(np.median(steps))
-    for place in np.flatnonzero(np.abs(steps - median) > bound * median):
+    for place in np.flatnonzero(~is_like(steps, median, time_s)):
         yield TraceError(
             "time-jitter",
             f"The steps between time stamps of the {words(name)} must stay within {bound:.0%} of their median.",

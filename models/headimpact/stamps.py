@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import NDArray
+
+from headimpact.published import QUALITY_LIMITS
 
 FloatArray = NDArray[np.float64]
 
@@ -17,6 +21,13 @@ def rounding_s(time_s: FloatArray) -> float:
     Stamps of a clock that counts from 1970 are exact to a quarter of a microsecond: a step of 1 ms to 0.05 %.
     """
     return float(2.0 * np.spacing(max(abs(float(time_s[0])), abs(float(time_s[-1])))))
+
+
+def is_like(steps: FloatArray, median: float, time_s: FloatArray) -> NDArray[np.bool_]:
+    """Which steps are within the greatest jitter of the median one, the rounding of their stamps aside."""
+    rounding = rounding_s(time_s)
+    bound = QUALITY_LIMITS["record"]["maximum_jitter"] * median + (rounding if isfinite(rounding) else 0.0)
+    return np.asarray(np.abs(steps - median) <= bound)
 
 
 def rate_said(time_s: FloatArray) -> float:

@@ -9,6 +9,7 @@ import pytest
 from waveforms import burst, recording
 
 from headimpact.cut_offs import NO_FILTER
+from headimpact.errors import TraceError
 from headimpact.kinematics import HeadKinematics, differentiate
 from headimpact.preparation import Preparation, prepare
 from headimpact.quality import QualityNote, check_truncation
@@ -141,6 +142,17 @@ def test_a_rate_under_1_khz_is_noted(rate_hz, noted):
     # stamps read to the microsecond scatter a 1 kHz device by parts per thousand
     found = notes(Recording(Signal(A, "g", rate_hz)), "low_sample_rate")
     assert [note.signal for note in found] == (["linear_acceleration"] if noted else [])
+
+
+@pytest.mark.parametrize("start_s", [0.0, -0.01, 1.7e9])
+def test_a_step_at_the_bound_of_jitter_is_within_it_on_either_side(start_s):
+    time_s = start_s + 1e-3 * np.arange(100)
+    time_s[50] += 0.15e-3
+    assert len(notes(Recording(Signal(A, "g", time_s=time_s)), "resampled")) == 1
+    time_s[50] += 0.002e-3
+    with pytest.raises(TraceError) as caught:
+        prepare(Recording(Signal(A, "g", time_s=time_s)))
+    assert caught.value.code == "time-jitter"
 
 
 @pytest.mark.parametrize(("jitter", "noted"), [(2e-6, True), (0.5e-6, False)])
