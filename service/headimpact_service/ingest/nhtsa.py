@@ -57,15 +57,19 @@ def read_nhtsa(archive: GuardedZip, options: ImportOptions) -> Iterator[ImpactRe
 
 
 def _curves(names: list[str], header: str) -> dict[int, str]:
-    """The curve files beside an EV5 file, by number; of several tests in one folder, those of its own name."""
-    folder = PurePosixPath(header).parent
-    beside = [PurePosixPath(name) for name in names if PurePosixPath(name).parent == folder]
-    curves = [(path, int(found[1])) for path in beside if (found := _CURVE.search(path.name)) is not None]
-    stems = {path.stem.lower() for path, _ in curves}
-    if len(stems) > 1:
-        own = PurePosixPath(header).stem.lower()
-        curves = [(path, number) for path, number in curves if path.stem.lower() == own]
-    return {number: str(path) for path, number in curves}
+    """The curve files of an EV5 file, by number: beside it, else below its folder or that folder's parent.
+
+    Of several tests in one folder, and of curves that are not beside it, those of its own name.
+    """
+    of = PurePosixPath(header)
+    curves = [path for path in map(PurePosixPath, names) if _CURVE.search(path.name) is not None]
+    own = [path for path in curves if path.stem.lower() == of.stem.lower()]
+    beside = [path for path in curves if path.parent == of.parent]
+    if len({path.stem.lower() for path in beside}) > 1:
+        beside = [path for path in beside if path in own]
+    below = [path for path in own if of.parent in path.parents]
+    near = [path for path in own if of.parent.parent in path.parents]
+    return {int(path.suffix[1:]): str(path) for path in beside or below or near}
 
 
 class _Head:
@@ -81,7 +85,10 @@ class _Head:
         """The head's record, in the laboratory's axes and unfiltered unless the sender asks otherwise."""
         signals = {name: curves for name in SIGNALS if (curves := self._curves_of(self._channels(name)))}
         if not signals:
-            raise curve_fault("No head channel of this occupant has its three curves in the archive.", "no-signal")
+            raise curve_fault(
+                "No head channel of this occupant has its three curves in the archive: add their .NNN files to the zip.",
+                "no-signal",
+            )
         mapping = preset_named(PRESET).mapping
         recording = head_recording(
             signals,

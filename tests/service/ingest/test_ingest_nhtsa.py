@@ -124,6 +124,16 @@ def test_several_tests_in_one_zip_keep_their_own_curves():
     assert second.metadata["test_number"] == "10998"
 
 
+@pytest.mark.parametrize(("header", "curves"), [("v10999/", "v10999/tsv/"), ("ev5/", "tsv/"), ("a/ev5/", "a/tsv/x/")])
+def test_curves_may_lie_in_a_folder_of_their_own(header: str, curves: str):
+    apart = {
+        (header if name.endswith("EV5") else curves) + name.removeprefix("v10999/"): text
+        for name, text in files().items()
+    }
+    record = one(zipped(apart | {f"{curves}v20000.001": curve(55.0)}))
+    assert values(record, "linear_acceleration").max(axis=0).tolist() == [1.0, 2.0, 3.0]
+
+
 def test_tests_in_one_folder_are_told_apart_by_name():
     both = files("") | {name.replace("v10999", "v20000"): text for name, text in files("").items()}
     both["v20000.001"] = curve(55.0)

@@ -71,6 +71,24 @@ def test_arrays_of_two_dimensions_are_one_impact():
     assert record.external_id == "a"
 
 
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("length", [40, 100])
+def test_components_may_be_arrays_of_impacts_by_samples(named: bool, length: int):
+    values = noise(3, length)
+    names = ("ax_g", "ay_g", "az_g", "wx_rad_s", "wy_rad_s", "wz_rad_s") if named else tuple("abcdef")
+    stored = {name: values[..., place] for place, name in enumerate(names)}
+    mapping = Mapping.model_validate(
+        {
+            "sample_rate_hz": 1000,
+            "linear_acceleration": {"unit": "g", "x": "a", "y": "b", "z": "c"},
+            "angular_velocity": {"unit": "rad/s", "x": "d", "y": "e", "z": "f"},
+        }
+    )
+    found = records(npz(**stored), **({"sample_rate_hz": 1000.0} if named else {"mapping": mapping}))
+    for record, sent in zip(found, values, strict=True):
+        np.testing.assert_array_equal(samples_of(record), sent)
+
+
 def test_signals_may_have_records_of_their_own_length():
     values = noise(3)
     data = npz(**arrays(values) | {"angular_velocity": values[:, :25, 3:]}, sample_rate_hz=1000.0)

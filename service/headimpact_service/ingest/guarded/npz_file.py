@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from headimpact_service.ingest.cells import number_text
-from headimpact_service.ingest.guarded.array_table import ArrayTable, Fact, Samples
+from headimpact_service.ingest.guarded.array_table import AXES, ArrayTable, Fact, Samples
 from headimpact_service.ingest.guarded.contents import MAX_TEXT, Content, NamedTable, checked_text, unreadable
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
@@ -22,6 +22,8 @@ SUFFIX = ".npy"
 MAX_HEADER = 4096
 MAX_FACTS = 16 * 1024 * 1024
 MAX_WIDTH = 64
+MOST_COMPONENTS = 8
+"""Of one signal: its axes and their resultant, of two sensors."""
 _TIMES = ("t", "time", "stamp")
 
 
@@ -98,7 +100,7 @@ def _table(archive: GuardedZip, members: list[_Member], units: dict[str, str]) -
         return _by_channel(archive, members, units)
     if any(len(member.shape) > 3 for member in members):
         raise unreadable("An array has at most three dimensions: impacts x samples x components.")
-    several = any(len(member.shape) == 3 for member in shaped)
+    several = _are_of_several(shaped)
     samples = [_samples(archive, member, several=several) for member in shaped]
     impacts, lengths = samples[0].impacts, {array.length for array in samples}
     facts: list[Fact] = []
@@ -121,6 +123,18 @@ def _by_channel(archive: GuardedZip, members: list[_Member], units: dict[str, st
         raise unreadable("The arrays of the channels differ in length.")
     facts = [_fact(archive, member, 1) for member in members if member not in rows]
     return ArrayTable([_repeated(archive, member, 1) for member in rows], facts, units)
+
+
+def _are_of_several(shaped: list[_Member]) -> bool:
+    """Whether arrays of two dimensions are impacts x samples, and not the samples x components of one impact.
+
+    They are beside an array of three, and where each component of a signal is an array: three or more of one shape,
+    wider than any signal has components.
+    """
+    if any(len(member.shape) == 3 for member in shaped):
+        return True
+    shapes = {member.shape for member in shaped}
+    return len(shaped) >= len(AXES) and len(shapes) == 1 and shaped[0].shape[1] > MOST_COMPONENTS
 
 
 def _is_along_samples(member: _Member, impacts: int, lengths: set[int]) -> bool:
