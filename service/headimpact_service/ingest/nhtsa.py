@@ -86,7 +86,7 @@ class _Head:
         signals = {name: curves for name in SIGNALS if (curves := self._curves_of(self._channels(name)))}
         if not signals:
             raise curve_fault(
-                "No head channel of this occupant has its three curves in the archive: add their .NNN files to the zip.",
+                "No head channel of this occupant has its three curves in the archive: add them to the zip.",
                 "no-signal",
             )
         mapping = preset_named(PRESET).mapping
