@@ -11,7 +11,7 @@ import numpy as np
 from headimpact.cut_offs import LowPass
 from headimpact.quality import QualityNote, words
 from headimpact.recording import AXES, AxesName, Recording, Signal, SignalName
-from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.stamps import may_be_stated
 from headimpact_service.ingest.table import FloatArray
 
@@ -62,14 +62,14 @@ def _common(curves: Sequence[Curve]) -> list[Curve]:
     """Curves of one rate cut to the samples that all of them have."""
     rate = curves[0].rate
     if any(curve.rate != rate for curve in curves):
-        raise curve_fault("The curves of one signal must be sampled at one rate.", "rates-differ")
+        raise file_fault("The curves of one signal must be sampled at one rate.", "rates-differ")
     if rate is None:
         return _on_the_same_stamps(curves)
     start = max(float(curve.stamps_s[0]) for curve in curves)
     offsets = [round((start - float(curve.stamps_s[0])) * rate) for curve in curves]
     count = min(curve.values.size - offset for curve, offset in zip(curves, offsets, strict=True))
     if count < 3:
-        raise curve_fault("The head's curves must overlap in time by at least 3 samples.", "no-overlap")
+        raise file_fault("The head's curves must overlap in time by at least 3 samples.", "no-overlap")
     return [
         replace(curve, values=curve.values[o : o + count], stamps_s=curve.stamps_s[o : o + count])
         for curve, o in zip(curves, offsets, strict=True)
@@ -100,7 +100,7 @@ def _peak_cut(signal: SignalName, curve: Curve, kept: Curve) -> Iterator[Quality
 
 def _on_the_same_stamps(curves: Sequence[Curve]) -> list[Curve]:
     if any(not np.array_equal(curve.stamps_s, curves[0].stamps_s) for curve in curves):
-        raise curve_fault("Curves whose stamps are not uniform must share them.", "rates-differ")
+        raise file_fault("Curves whose stamps are not uniform must share them.", "rates-differ")
     return list(curves)
 
 
@@ -129,7 +129,7 @@ def _values(curves: Sequence[Curve]) -> FloatArray:
 def _unit(curves: Sequence[Curve]) -> str:
     units = {curve.unit for curve in curves}
     if len(units) > 1:
-        raise curve_fault("The curves of one signal must be in one unit.", "units-differ")
+        raise file_fault("The curves of one signal must be in one unit.", "units-differ")
     return units.pop()
 
 
@@ -137,8 +137,3 @@ def _range(curves: Sequence[Curve]) -> float | None:
     """The sensors' full scale, where all have one: their largest, so that no smaller one raises a false alarm."""
     scales = [curve.full_scale for curve in curves]
     return max(scale for scale in scales if scale is not None) if all(scales) else None
-
-
-def curve_fault(detail: str, code: str) -> Problem:
-    """The 422 for channels that do not make a head."""
-    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code=code)])

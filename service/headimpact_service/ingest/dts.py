@@ -18,7 +18,7 @@ import numpy as np
 
 from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, curve_fault
+from headimpact_service.ingest.curves import Curve
 from headimpact_service.ingest.dts_header import (
     A_NUMBER,
     MAX_HEADER_ROWS,
@@ -27,6 +27,7 @@ from headimpact_service.ingest.dts_header import (
     read_header,
     without_empty_end,
 )
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.iso_codes import HeadCode, head_code
@@ -96,7 +97,7 @@ def _rows(source: Source) -> list[list[str]]:
     if any(len(line) > MAX_LINE or "\0" in line for line in lines):
         raise Problem("unreadable-file", f"A line may have at most {MAX_LINE} characters, and no NUL among them.")
     if len(lines) > MAX_HEADER_ROWS + MAX_SAMPLES + 100:
-        raise curve_fault(f"A file may hold at most {MAX_SAMPLES} samples.", "sample-count")
+        raise file_fault(f"A file may hold at most {MAX_SAMPLES} samples.", "sample-count")
     wanted = next(
         (line for line in lines[:MAX_HEADER_ROWS] if key_of(re.split(r"[,;\t]", line)[0]) == "code"), lines[0]
     )
@@ -136,13 +137,13 @@ class _Data:
         self.first = self._first_column()
         headings = [cell for cell in header.headings if cell in codes]
         if sorted(headings) == sorted(filter(None, codes)) and headings != list(filter(None, codes)):
-            raise curve_fault(
+            raise file_fault(
                 "The headings above the samples stand in another order than the channels' codes: which is right?",
                 "heading-order",
             )
         rate = header.rate_hz
         if rate is None or rate <= 0.0:
-            raise curve_fault("The header gives no sample rate.", "rate-missing")
+            raise file_fault("The header gives no sample rate.", "rate-missing")
         self.rate = rate
         self.points_before = self._points_before()
 
@@ -165,7 +166,7 @@ class _Data:
         if told is None:
             return by_times
         if abs(told - by_times) > 1.0:
-            raise curve_fault(
+            raise file_fault(
                 f"The header says that {told:g} samples lie before the trigger, the times say {by_times:g}.",
                 "time-zero",
             )
@@ -177,7 +178,7 @@ class _Data:
             return None
         cells = [row[0] if row else "" for row in self.rows]
         if not all(map(A_NUMBER.fullmatch, cells)) or len(cells) < 3:
-            raise curve_fault(
+            raise file_fault(
                 "A cell of the column before the channels, which gives the times, is no number.", "time-form"
             )
         times = np.array([float(cell) for cell in cells])
@@ -187,7 +188,7 @@ class _Data:
         if (np.diff(times) == 1.0).all():
             return None
         step = float(np.median(np.diff(times)))
-        raise curve_fault(
+        raise file_fault(
             f"The column before the channels steps by {step:g}, evenly or not, where the header says {self.rate:g} "
             "samples per second: which of them is right?",
             "rates-differ",
@@ -222,7 +223,7 @@ class _Data:
     def _curve(self, code: HeadCode, index: int) -> Curve:
         unit = unit_spelled(code.signal, self.header.of_channel("unit", index))
         if unit is None:
-            raise curve_fault(f"The unit of {self.named(index)} is none that is known for it.", "unit-missing")
+            raise file_fault(f"The unit of {self.named(index)} is none that is known for it.", "unit-missing")
         values = self.values(index)
         stamps: FloatArray = (np.arange(values.size, dtype=np.float64) - (self.points_before or 0.0)) / self.rate
         return Curve(code.axis, unit, values, stamps, self.rate)
@@ -232,7 +233,7 @@ class _Data:
         column = index + self.first
         cells = [row[column] if column < len(row) else "" for row in self.rows]
         if not 3 <= len(cells) <= MAX_SAMPLES:
-            raise curve_fault(f"The file must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
+            raise file_fault(f"The file must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
         return np.array([self._value(cell, index, sample) for sample, cell in enumerate(cells)])
 
     def _value(self, cell: str, index: int, sample: int) -> float:
@@ -240,7 +241,7 @@ class _Data:
             return float(cell)
         if not cell or cell.upper() in {NO_VALUE, "NAN"}:
             return float("nan")
-        raise curve_fault(f"{self.named(index)} holds what is no number at sample {sample}.", "missing-sample")
+        raise file_fault(f"{self.named(index)} holds what is no number at sample {sample}.", "missing-sample")
 
 
 class _Channels:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import curve_fault
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.iso_mme_files import NUMBER
 from headimpact_service.ingest.spelling import compact
 
@@ -75,7 +75,7 @@ class Header:
             return None
         numbers = {float(cell) for cell in cells if A_NUMBER.fullmatch(cell)}
         if len(numbers) != 1 or not all(A_NUMBER.fullmatch(cell) for cell in cells):
-            raise curve_fault(f"{what} must be one number for all channels.", "rates-differ")
+            raise file_fault(f"{what} must be one number for all channels.", "rates-differ")
         return numbers.pop()
 
     def points_before(self, rate_hz: float) -> float | None:
@@ -86,7 +86,7 @@ class Header:
         if told is None or self.before_s is not None:
             return None if told is None or self.before_s is None else told * self.before_s * rate_hz
         if told != round(told):
-            raise curve_fault(
+            raise file_fault(
                 f"The header says that {told:g} points lie before the trigger: it counts them.", "time-zero"
             )
         return told

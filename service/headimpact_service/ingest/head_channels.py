@@ -12,7 +12,8 @@ from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant, words
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, check_cut, curve_fault, head_recording
+from headimpact_service.ingest.curves import Curve, check_cut, head_recording
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_reading import low_pass
 from headimpact_service.ingest.iso_codes import RESULTANT, HeadCode
 from headimpact_service.ingest.options import ImportOptions
@@ -76,7 +77,7 @@ class _Head:
         """The head's record; with no signal that has its three axes, one that must not be scored."""
         found = {name: curves for name in SIGNALS if (curves := self._curves(name))}
         if not found:
-            raise curve_fault("The head has a resultant only: its three axes are needed.", "no-signal")
+            raise file_fault("The head has a resultant only: its three axes are needed.", "no-signal")
         whole = {name: curves for name, curves in found.items() if len(curves) == len(AXES)}
         for name in found:
             if name not in whole:
@@ -146,7 +147,7 @@ class _Head:
             missing = np.flatnonzero(np.isnan(curve.values))
             if missing.size:
                 detail = f"The {words(signal)} {curve.axis} has no value at sample {missing[0]}."
-                raise curve_fault(detail, "missing-sample")
+                raise file_fault(detail, "missing-sample")
 
     def _compare_resultant(self, signal: SignalName, unit: str, values: np.ndarray[Any, np.dtype[np.float64]]) -> None:
         """The resultant that the file supplies, against the one of its samples."""

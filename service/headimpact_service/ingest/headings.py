@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from headimpact.recording import AXES, SIGNALS, SignalName
-from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.errors import Problem
 from headimpact_service.ingest import mapping as mappings
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.spelling import MAX_COMPACT, compact, without_unit
 
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
@@ -64,10 +65,9 @@ def _places(names: Sequence[str]) -> dict[str, list[int]]:
     return places
 
 
-def layout_problem(detail: str, *, code: str, parameter: str = "mapping", pointer: str | None = None) -> Problem:
-    """The 422 for a table whose columns do not give what an impact needs."""
-    fault = PayloadError(detail=detail, code=code, parameter=parameter, pointer=pointer)
-    return Problem("unreadable-file", detail, errors=[fault])
+def layout_problem(detail: str, *, code: str, pointer: str | None = None) -> Problem:
+    """The 422 for a table whose columns do not give what an impact needs; `pointer` is into its mapping."""
+    return file_fault(detail, code, parameter="mapping", pointer=pointer)
 
 
 @dataclass(frozen=True, slots=True)

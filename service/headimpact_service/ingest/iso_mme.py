@@ -14,7 +14,8 @@ import numpy as np
 
 from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, curve_fault
+from headimpact_service.ingest.curves import Curve
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
 from headimpact_service.ingest.iso_codes import HeadCode, head_code, is_time
 from headimpact_service.ingest.iso_mme_files import Header, listed_channels, read_channel, read_header
@@ -145,7 +146,7 @@ class _Test:
         header, values = self._file(number)
         unit = unit_spelled(code.signal, header.text("unit"))
         if unit is None:
-            raise curve_fault(f"The unit of {_named(code, number)} is none that is known for it.", "unit-missing")
+            raise file_fault(f"The unit of {_named(code, number)} is none that is known for it.", "unit-missing")
         stamps, rate = self._stamps(header, values.size, _named(code, number))
         full_scale = header.number("channel amplitude class")
         return Curve(code.axis, unit, values, stamps, rate, full_scale if full_scale and full_scale > 0 else None)
@@ -154,7 +155,7 @@ class _Test:
         """The channel's times [s] and their rate: implicit in its header, or those of the channel that it refers to."""
         for key in ("sampling interval", "time of first sample"):
             if header.text(key) is not None and header.number(key) is None:
-                raise curve_fault(f"The {key} of {named} is no number of seconds.", "time-form")
+                raise file_fault(f"The {key} of {named} is no number of seconds.", "time-form")
         step, told = self._step(header, named), header.number("time of first sample")
         explicit = (header.text("reference channel") or "").casefold() == "explicit"
         if explicit or step is None or (told is None and self._refers(header)):
@@ -162,7 +163,7 @@ class _Test:
         else:
             stamps = (told or 0.0) + step * np.arange(count, dtype=np.float64)
         if not (np.diff(stamps) > 0).all():
-            raise curve_fault(f"The times of {named} must increase.", "time-not-increasing")
+            raise file_fault(f"The times of {named} must increase.", "time-not-increasing")
         return stamps, nominal_rate(stamps)
 
     def _step(self, header: Header, named: str) -> float | None:
@@ -170,7 +171,7 @@ class _Test:
         step = header.number("sampling interval")
         if step is not None and not (step == 0.0 and self._refers(header)):
             if not 0.0 < step < 1.0:
-                raise curve_fault(f"The sampling interval of {named} is {step:g}: it is one in seconds.", "time-form")
+                raise file_fault(f"The sampling interval of {named} is {step:g}: it is one in seconds.", "time-form")
             return step
         return None if self.options.sample_rate_hz is None else 1.0 / self.options.sample_rate_hz
 
@@ -182,7 +183,7 @@ class _Test:
         """Whether the head's channels say when they begin: all of them or none; 422 for some."""
         if len(self.begin) > 1:
             detail = "Some of the head's channels say the time of their first sample, some do not."
-            raise curve_fault(detail, "time-missing")
+            raise file_fault(detail, "time-missing")
         return self.begin != {False}
 
     def _reference(self, header: Header, count: int, named: str) -> FloatArray:
@@ -192,7 +193,7 @@ class _Test:
                 found, stamps = self._file(number)
                 if (found.text("channel code") or wanted).upper() == wanted:
                     return _in_seconds(found, stamps, count, named)
-        raise curve_fault(
+        raise file_fault(
             f"The times of {named} are neither in its header nor in a channel of the set that it names.", "time-missing"
         )
 
@@ -237,7 +238,7 @@ def _named(code: HeadCode, number: int) -> str:
 def _in_seconds(header: Header, stamps: FloatArray, count: int, named: str) -> FloatArray:
     factor = _TIME_UNITS.get(compact(header.text("unit") or ""))
     if factor is None:
-        raise curve_fault(f"The unit of the times of {named} is neither s, ms nor µs.", "unit-missing")
+        raise file_fault(f"The unit of the times of {named} is neither s, ms nor µs.", "unit-missing")
     if stamps.size != count or not np.isfinite(stamps).all():
-        raise curve_fault(f"The times of {named} must be as many as its samples: {count}.", "stamp-count")
+        raise file_fault(f"The times of {named} must be as many as its samples: {count}.", "stamp-count")
     return stamps * factor

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from headimpact_service.ingest.curves import curve_fault
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.table import FloatArray
 
@@ -64,7 +64,7 @@ def read_channel(data: bytes, named: str) -> tuple[Header, FloatArray]:
         422: below the header stands what is no number, or too many of them.
     """
     if len(data) > MAX_FILE:
-        raise curve_fault(f"The file of {named} may have at most {MAX_FILE} bytes.", "sample-count")
+        raise file_fault(f"The file of {named} may have at most {MAX_FILE} bytes.", "sample-count")
     lines = _lines(data)
     header, first = _header(lines)
     return header, _samples(lines[first:], named)
@@ -96,9 +96,9 @@ def _header(lines: list[str]) -> tuple[Header, int]:
 def _samples(lines: list[str], named: str) -> FloatArray:
     cells = [line for line in lines if line]
     if not 3 <= len(cells) <= MAX_SAMPLES:
-        raise curve_fault(f"The file of {named} must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
+        raise file_fault(f"The file of {named} must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
     numbers = ["nan" if cell.upper() == NO_VALUE else cell for cell in cells]
     for index, cell in enumerate(numbers):
         if cell != "nan" and re.fullmatch(NUMBER, cell, re.ASCII) is None:
-            raise curve_fault(f"The file of {named} holds what is no number at sample {index}.", "missing-sample")
+            raise file_fault(f"The file of {named} holds what is no number at sample {index}.", "missing-sample")
     return np.array([float(cell) for cell in numbers])

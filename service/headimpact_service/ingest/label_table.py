@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pydantic import BaseModel
 from pydantic_core import to_json
 
-from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.ingest.json_faults import parse
 from headimpact_service.ingest.text_facts import delimiter_of
@@ -47,7 +48,7 @@ def read_labels(data: bytes, model: type[BaseModel]) -> list[LabelLine]:
     lines = []
     for index, cells in enumerate(rows):
         if index >= MAX_ROWS:
-            raise _unreadable(f"A table of labels has at most {MAX_ROWS} lines.")
+            raise file_fault(f"A table of labels has at most {MAX_ROWS} lines.", "table")
         lines.append(_line(index, header, cells, model))
     return _without_contradictions(lines)
 
@@ -56,26 +57,26 @@ def _rows(data: bytes) -> Iterator[list[str]]:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise _unreadable("The table is not text in UTF-8.") from None
+        raise file_fault("The table is not text in UTF-8.", "table") from None
     heading = next((line for line in text.splitlines() if line.strip()), "")
     delimiter = delimiter_of(heading) if heading else ","
     try:
         yield from (row for row in csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True) if row)
     except csv.Error as error:
-        raise _unreadable(f"The table is no CSV: {error}.") from None
+        raise file_fault(f"The table is no CSV: {error}.", "table") from None
 
 
 def _require_columns(header: Sequence[str], model: type[BaseModel]) -> None:
     known = (*IMPACT, *model.model_fields)
     if not any(name in header for name in IMPACT):
-        raise _unreadable("The table needs a column impact_id or external_id.")
+        raise file_fault("The table needs a column impact_id or external_id.", "table")
     missing = [name for name, field in model.model_fields.items() if field.is_required() and name not in header]
     if missing:
-        raise _unreadable(f"The table has no column {missing[0]}.")
+        raise file_fault(f"The table has no column {missing[0]}.", "table")
     if len(set(header)) < len(header):
-        raise _unreadable("The table has a column twice.")
+        raise file_fault("The table has a column twice.", "table")
     if any(name not in known for name in header):
-        raise _unreadable(f"Columns of a table of labels are: {', '.join(known)}.")
+        raise file_fault(f"Columns of a table of labels are: {', '.join(known)}.", "table")
 
 
 def _line(index: int, header: Sequence[str], cells: Sequence[str], model: type[BaseModel]) -> LabelLine:
@@ -117,7 +118,3 @@ def _without_contradictions(lines: Sequence[LabelLine]) -> list[LabelLine]:
 
 def _name(line: LabelLine) -> tuple[str | None, str | None]:
     return (line.impact_id, None) if line.impact_id is not None else (None, line.external_id)
-
-
-def _unreadable(detail: str) -> Problem:
-    return Problem("unreadable-file", detail, errors=[PayloadError(detail, "table")])

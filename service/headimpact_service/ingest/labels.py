@@ -10,7 +10,8 @@ from typing import Annotated, Any, get_args
 from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import from_json
 
-from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import (
     MAX_NAME,
     MAX_RATE_HZ,
@@ -91,13 +92,13 @@ def context_of(texts: Texts) -> dict[str, Any]:
 def _cell_problem(error: ValidationError) -> Problem:
     faults = error.errors(include_url=False, include_input=False)
     fault, field = payload_errors(faults[:1], None)[0], str(faults[0]["loc"][0])
-    return label_fault(f"The column of {field}: {fault.detail}", fault.code, parameter=field)
+    return file_fault(f"The column of {field}: {fault.detail}", fault.code, parameter=field)
 
 
 def checked_name(text: str | None, field: str) -> str | None:
     """A name as the sender gives it, unless it breaks the rules of names."""
     if text is not None and (len(text) > MAX_NAME or _PRINTABLE.match(text) is None):
-        raise label_fault(f"A name has 1 to {MAX_NAME} printable characters.", "name-form", parameter=field)
+        raise file_fault(f"A name has 1 to {MAX_NAME} printable characters.", "name-form", parameter=field)
     return text
 
 
@@ -110,9 +111,4 @@ def moment(parts: list[str | None], time_zone: str | None) -> datetime | None:
         return instant(text, time_zone)
     except TimeError as error:
         detail = f"{error} If the file's own time is broken, give occurred_at beside the file."
-        raise label_fault(detail, error.code, parameter=error.field) from None
-
-
-def label_fault(detail: str, code: str, parameter: str | None = None) -> Problem:
-    """The 422 for an impact of a table."""
-    return Problem("unreadable-file", detail, errors=[PayloadError(detail=detail, code=code, parameter=parameter)])
+        raise file_fault(detail, error.code, parameter=error.field) from None

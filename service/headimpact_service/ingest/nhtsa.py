@@ -13,7 +13,8 @@ from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, check_cut, curve_fault, head_recording
+from headimpact_service.ingest.curves import Curve, check_cut, head_recording
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass
 from headimpact_service.ingest.nhtsa_header import DOUBTFUL, INVALID, SOUND, Channel, CrashTest, Occupant, read_header
@@ -85,7 +86,7 @@ class _Head:
         """The head's record, in the laboratory's axes and unfiltered unless the sender asks otherwise."""
         signals = {name: curves for name in SIGNALS if (curves := self._curves_of(self._channels(name)))}
         if not signals:
-            raise curve_fault(
+            raise file_fault(
                 "No head channel of this occupant has its three curves in the archive: add them to the zip.",
                 "no-signal",
             )
@@ -137,10 +138,10 @@ class _Head:
             self._note("sample_count_mismatch", detail, channel)
         rate = nominal_rate(stamps)
         if rate is None:
-            raise curve_fault(f"The times of {channel.named} must increase in equal steps.", "time-not-increasing")
+            raise file_fault(f"The times of {channel.named} must increase in equal steps.", "time-not-increasing")
         self._compare_times(channel, float(stamps[0]), rate)
         if channel.unit is None:
-            raise curve_fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
+            raise file_fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
         return Curve(channel.axis, channel.unit, values, stamps, rate, channel.full_scale)
 
     def _compare_times(self, channel: Channel, first_s: float, rate: float) -> None:
@@ -178,13 +179,13 @@ class _Head:
 def _columns(data: bytes, channel: Channel) -> tuple[FloatArray, FloatArray]:
     """Stamps and values: two numbers a line."""
     if len(data) > MAX_CURVE or _NUMBERS.fullmatch(data) is None:
-        raise curve_fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
+        raise file_fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
     try:
         numbers = np.array(list(map(float, data.split())), dtype=np.float64)
     except ValueError:
-        raise curve_fault(f"The file of {channel.named} holds what is no number.", "missing-sample") from None
+        raise file_fault(f"The file of {channel.named} holds what is no number.", "missing-sample") from None
     if numbers.size % 2 or not np.isfinite(numbers).all():
-        raise curve_fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
+        raise file_fault(f"The file of {channel.named} must hold a time and a value a line.", "missing-sample")
     if not 6 <= numbers.size <= 2 * MAX_SAMPLES:
-        raise curve_fault(f"The file of {channel.named} must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
+        raise file_fault(f"The file of {channel.named} must hold 3 to {MAX_SAMPLES} samples.", "sample-count")
     return numbers[0::2].copy(), numbers[1::2].copy()

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from headimpact.recording import Recording, Signal
-from headimpact_service.ingest.labels import label_fault
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.stamps import DRIFT, follows
@@ -48,7 +48,7 @@ def _at_rate(signal: Signal, sample_rate_hz: float) -> Signal:
         own = signal.sample_rate_hz
         agrees = own is None or abs(own - sample_rate_hz) <= DRIFT * own
     if not agrees:
-        raise label_fault(
+        raise file_fault(
             f"The file's own times or rate are not those of {sample_rate_hz:g} samples per second: leave out the rate "
             "beside it.",
             "rate-differs",

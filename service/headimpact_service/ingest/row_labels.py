@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
-from headimpact_service.ingest.labels import label_fault
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.unread import are_several, begins_anew, lie_apart, longest_s, moment_of, span_s
 from headimpact_service.ingest.windows import Rows, numbers_of
@@ -79,7 +79,7 @@ class RowLabels:
             raise self._several("The time of the impact is not the same")
 
     def _several(self, what: str, otherwise: str = "") -> Problem:
-        return label_fault(
+        return file_fault(
             f"{what} in all rows of the impact that begins in row {self.row + 1} below the headings: if they are "
             f"several impacts, tell them apart by a column impact_id or a mapping's group_by{otherwise}.",
             "several-impacts",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from headimpact_service.ingest.labels import label_fault
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.layout import Layout, SignalLayout
 from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns, FloatArray
@@ -48,7 +48,7 @@ class Samples:
         for column in columns:
             faulty = np.flatnonzero(~np.isfinite(self.numbers[column][rows]))
             if faulty.size:
-                raise label_fault(
+                raise file_fault(
                     f"A cell of column {column + 1} is not a finite number, at sample {faulty[0]} of the impact that "
                     f"begins in row {first + 1} below the headings.",
                     "missing-sample",

@@ -16,6 +16,7 @@ from headimpact.quality import QualityNote, check_reported_resultant
 from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
 from headimpact_service.ingest.formula_cells import unguarded, unguarded_name
 from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
@@ -25,7 +26,6 @@ from headimpact_service.ingest.labels import (
     Reading,
     checked_name,
     context_of,
-    label_fault,
     moment,
     reading_of,
 )
@@ -145,7 +145,7 @@ class TableImpact:
         if self.reading.mounting is not None:
             if self.reading.location == "head_cg":
                 detail = "A mounting is for signals of the sensor: the row says that they are the head's."
-                raise label_fault(detail, "mounting-not-needed", parameter="location")
+                raise file_fault(detail, "mounting-not-needed", parameter="location")
             return mounting(self.reading.mounting, "/mounting")
         if self._location != "sensor" or self.mapping.mounting is None:
             return None
@@ -171,9 +171,9 @@ class TableImpact:
                 if not np.isnan(values[rows]).all()
             ]
         if len({track.name for track in tracks}) < len(tracks):
-            raise label_fault("A signal's samples stand in one part of its impact only.", "time-base")
+            raise file_fault("A signal's samples stand in one part of its impact only.", "time-base")
         if not tracks:
-            raise label_fault("The impact has no samples.", "no-signal")
+            raise file_fault("The impact has no samples.", "no-signal")
         return tracks
 
     def _note_end(self, tracks: list[Track]) -> None:
@@ -267,7 +267,7 @@ class TableImpact:
         stray = np.flatnonzero(steps <= 0 if allow_gaps else steps != 1)
         if stray.size:
             before, after = numbers[stray[0] : stray[0] + 2].tolist()
-            raise label_fault(
+            raise file_fault(
                 f"Sample {after:g} follows sample {before:g} in the impact that begins in row "
                 f"{self.row + 1} below the headings: some are missing or out of order.",
                 "sample-order",
@@ -280,7 +280,7 @@ class TableImpact:
             assert clock is not None
             one, two = (self.samples.numbers[found.column][self.rows] * found.milliseconds for found in (clock, other))
             if not agree(one, two):
-                raise label_fault(
+                raise file_fault(
                     f"Columns {clock.column + 1} and {other.column + 1} both give the times and do not agree: say in a "
                     "mapping which to take.",
                     "times-differ",
@@ -328,7 +328,7 @@ class TableImpact:
         if before is None and self.mapping.zero == "trigger":
             if min(spans)[0] != 0.0:
                 detail = "The record's times must include zero, which its layout says is the trigger."
-                raise label_fault(detail, "time-zero")
+                raise file_fault(detail, "time-zero")
             return 0.0
         return stated if before is None else before
 
@@ -336,7 +336,7 @@ class TableImpact:
         """Refuse a record that is over before its trigger: it is not of this layout."""
         lengths = [1000.0 * len(numbers_of(track.rows)) / track.rate for track in tracks if track.rate is not None]
         if before_ms is not None and lengths and len(lengths) == len(tracks) and max(lengths) < before_ms:
-            raise label_fault(
+            raise file_fault(
                 f"The record of {max(lengths):g} ms is over before its trigger, which its layout puts at "
                 f"{before_ms:g} ms.",
                 "time-zero",
@@ -356,7 +356,7 @@ class TableImpact:
         # A copy, so that one impact that is kept does not keep the whole table.
         values = self.samples.signals[track.name][track.rows].copy()
         if values.shape[0] > MAX_SAMPLES:
-            raise label_fault(f"An impact may have at most {MAX_SAMPLES} samples.", "sample-count")
+            raise file_fault(f"An impact may have at most {MAX_SAMPLES} samples.", "sample-count")
         if layout.resultant is not None:
             reported = self.samples.numbers[layout.resultant][track.rows]
             self.notes += check_reported_resultant(track.name, layout.unit, reported, values)
@@ -397,7 +397,7 @@ def _require_one_rate(said: Iterable[float | None]) -> None:
     """Refuse rates of one signal that differ by more than what clocks drift."""
     given = [rate for rate in said if rate is not None]
     if given and max(given) - min(given) > DRIFT * min(given):
-        raise label_fault(
+        raise file_fault(
             f"The impact is said to have {min(given):g} samples per second and {max(given):g}: leave out the rate that "
             "is wrong.",
             "rate-differs",
@@ -408,7 +408,7 @@ def _require_one_rate(said: Iterable[float | None]) -> None:
 def _require_on_time(stamps_ms: FloatArray, rate: float) -> None:
     """Refuse times that are not those of a rate."""
     if not follows(stamps_ms[np.isfinite(stamps_ms)], rate):
-        raise label_fault(
+        raise file_fault(
             f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew or "
             "are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a mapping).",
             "rate-differs",

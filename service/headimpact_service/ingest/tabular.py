@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from headimpact.quality import words
-from headimpact_service.errors import PayloadError, Problem
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.file_names import named_facts
 from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
@@ -132,12 +133,11 @@ def _require_rate(layout: Layout, plan: Plan) -> None:
     stated = plan.options.sample_rate_hz is not None or plan.mapping.sample_rate_hz is not None
     said = stated or layout.clock is not None or "sample_rate_hz" in layout.reading
     if not said and any(signal.clock is None and signal.sample_rate_hz is None for signal in layout.signals.values()):
-        fault = PayloadError(
-            detail="The file has no column of times that is known: give its sample rate.",
-            code="rate-missing",
+        raise file_fault(
+            "The file has no column of times that is known: give its sample rate.",
+            "rate-missing",
             parameter="sample_rate_hz",
         )
-        raise Problem("unreadable-file", fault.detail, errors=[fault])
 
 
 _TIMES_OR_RATES = frozenset(
@@ -157,10 +157,10 @@ def _require_no_other_rate(layout: Layout, plan: Plan, headings: Headings) -> No
     unread = set(range(len(headings.written))) - {*layout.numbers, *layout.texts}
     for column in sorted(unread):
         if compact(headings.written[column]) in _TIMES_OR_RATES:
-            raise layout_problem(
+            raise file_fault(
                 f"The column {headings.written[column]} seems to say times or a rate and is not read: name it in a "
                 f"mapping's time, with its unit, or give sample_rate_hz beside the file ({plan.preset} would take "
                 f"{plan.mapping.sample_rate_hz:g} Hz).",
-                code="rate-unclear",
+                "rate-unclear",
                 parameter="sample_rate_hz",
             )

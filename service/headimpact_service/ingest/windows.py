@@ -10,7 +10,7 @@ import numpy as np
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import Stacked, said
-from headimpact_service.ingest.labels import label_fault
+from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.table import Columns
 
 WINDOW_ROWS = 65_536
@@ -68,7 +68,7 @@ def _single(blocks: Iterable[Columns], max_rows: int) -> Iterator[Window]:
         held.append(block)
         count += block.rows
         if block.joined:
-            raise label_fault(
+            raise file_fault(
                 "The headings stand again among the samples: if files of several impacts were joined, tell them apart "
                 "by a column impact_id or a mapping's group_by.",
                 "several-impacts",
