@@ -76,20 +76,20 @@ def _common(curves: Sequence[Curve]) -> list[Curve]:
     ]
 
 
-def check_cut(signal: SignalName, curves: Sequence[Curve]) -> Iterator[QualityNote]:
-    """What the curves of one signal lose by being cut to what all of them have."""
-    for curve, kept in zip(curves, _common(curves), strict=True):
-        if kept.values.size < curve.values.size:
+def check_cut(signal: SignalName, curves: Sequence[Curve], read: FloatArray) -> Iterator[QualityNote]:
+    """What the curves of one signal lose by being cut to what all of them have, the samples that are `read`."""
+    for curve in curves:
+        if len(read) < curve.values.size:
             detail = (
                 f"Of the {curve.values.size} samples of the {words(signal)} on {curve.axis}, those "
-                f"{kept.values.size} are read that all its axes have."
+                f"{len(read)} are read that all its axes have."
             )
             yield QualityNote("sample_count_mismatch", "warning", detail, signal, curve.axis)
-            yield from _peak_cut(signal, curve, kept)
+            yield from _peak_cut(signal, curve, read[:, AXES.index(curve.axis)])
 
 
-def _peak_cut(signal: SignalName, curve: Curve, kept: Curve) -> Iterator[QualityNote]:
-    within, whole = (float(np.nanmax(np.abs(c.values), initial=0.0)) for c in (kept, curve))
+def _peak_cut(signal: SignalName, curve: Curve, read: FloatArray) -> Iterator[QualityNote]:
+    within, whole = (float(np.nanmax(np.abs(values), initial=0.0)) for values in (read, curve.values))
     if whole > within:
         detail = (
             f"The {words(signal)} on {curve.axis} is larger where not all its axes were recorded, {whole:.4g} "

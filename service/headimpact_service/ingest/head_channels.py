@@ -91,7 +91,7 @@ class _Head:
             fill_gaps=self.options.fill_gaps,
         )
         for name, signal in recording.signals():
-            self.notes += check_cut(name, found[name])
+            self.notes += check_cut(name, found[name], signal.values)
             self._require_whole(name, found[name])
             self._compare_resultant(name, signal.unit, signal.values)
         return ImpactRecord(

@@ -96,8 +96,8 @@ class _Head:
             axes=mapping.axes or "anatomical",
             low_pass=PAPER if mapping.filter is None else low_pass(mapping.filter),
         )
-        for name, curves in signals.items():
-            self.notes += check_cut(name, curves)
+        for name, signal in recording.signals():
+            self.notes += check_cut(name, signals[name], signal.values)
         return ImpactRecord(
             recording=recording,
             metadata=self._metadata(),
