@@ -20,6 +20,7 @@ import numpy as np
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import LineCells, is_no_number
+from headimpact_service.ingest.decimal_commas import MIXED, has_comma
 from headimpact_service.ingest.heading_rows import LOOK, top_of
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 MAX_COLUMNS = 1024
 ROWS_AT_ONCE = 4096
 _SEPARATOR = re.compile(r"sep=.\s*", re.IGNORECASE)
-_DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*", re.ASCII)
 Block = tuple[FloatArray, Sequence[Sequence[str]]]
 # float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
@@ -204,7 +204,7 @@ class CsvTable:
     def _number(self, cell: str) -> float:
         """The number in a cell; NaN where there is none, infinite where something else stands."""
         comma = _NUMBER.fullmatch(cell) is None
-        if comma and _DECIMAL_COMMA.fullmatch(cell) is None:
+        if comma and not has_comma(cell):
             return float("nan" if is_no_number(cell) else "inf")
         if comma and not self._decimal_commas:
             return self._unclear(
@@ -215,7 +215,7 @@ class CsvTable:
             mark = "," if comma else "."
             self._decimal_mark = self._decimal_mark or mark
             if mark != self._decimal_mark:
-                return self._unclear("The file's numbers have decimal commas, and points too: use one of them.")
+                return self._unclear(MIXED)
         return float(cell.replace(",", "."))
 
     def _unclear(self, detail: str) -> float:
@@ -227,7 +227,7 @@ class CsvTable:
 
 def _is_word(cell: str) -> bool:
     """Whether a cell holds something, and no number however that is written."""
-    return not (is_no_number(cell) or _NUMBER.fullmatch(cell) or _DECIMAL_COMMA.fullmatch(cell))
+    return not (is_no_number(cell) or _NUMBER.fullmatch(cell) or has_comma(cell))
 
 
 def _lines(stream: BinaryIO, encoding: str) -> Iterator[str]:

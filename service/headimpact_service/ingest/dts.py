@@ -18,7 +18,9 @@ import numpy as np
 
 from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import is_written_number
 from headimpact_service.ingest.curves import Curve
+from headimpact_service.ingest.decimal_commas import MIXED, has_comma, has_decimal_comma
 from headimpact_service.ingest.dts_header import (
     A_NUMBER,
     MAX_HEADER_ROWS,
@@ -39,6 +41,7 @@ from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.stamps import follows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
+from headimpact_service.ingest.text_facts import unreadable
 
 PRESET = "dts"
 MAX_FILE = 64 * 1024 * 1024
@@ -47,8 +50,6 @@ MAX_LINE = 256 * 1024
 
 _UNITS_PER_S = (1.0, 1e3, 1e6)
 """What a column of times may count: seconds, or parts of them."""
-_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?", re.ASCII)
-_MAY_GROUP = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", re.ASCII)
 
 
 def is_dts(head: bytes) -> bool:
@@ -106,16 +107,18 @@ def _rows(source: Source) -> list[list[str]]:
         found = list(csv.reader(lines, delimiter=delimiter, strict=True))
     except csv.Error:
         raise Problem("unreadable-file", "The file's quotes do not match.") from None
-    rows = [[cell.strip() for cell in row] for row in found if any(cell.strip() for cell in row)]
-    return rows if delimiter == "," else _with_decimal_points(rows)
+    return _with_decimal_points([[cell.strip() for cell in row] for row in found if any(cell.strip() for cell in row)])
 
 
 def _with_decimal_points(rows: list[list[str]]) -> list[list[str]]:
-    """The rows of a file with decimal commas: some comma in its numbers cannot group thousands."""
-    told = {cell for row in rows for cell in row if _DECIMAL_COMMA.fullmatch(cell)}
-    if all(_MAY_GROUP.fullmatch(cell) for cell in told):
+    """The rows of a file, which may have decimal commas; 422 where its samples have points too."""
+    commas = {cell for row in rows for cell in row if "," in cell and has_comma(cell)}
+    if not any(map(has_decimal_comma, commas)):
         return rows
-    return [[cell.replace(",", ".") if cell in told else cell for cell in row] for row in rows]
+    samples = (cell for row in rows if is_written_number(row[0]) for cell in row if is_written_number(cell))
+    if len({mark for cell in samples for mark in ".," if mark in cell}) > 1:
+        raise unreadable(MIXED)
+    return [[cell.replace(",", ".") if cell in commas else cell for cell in row] for row in rows]
 
 
 def _delimiter(line: str) -> str:

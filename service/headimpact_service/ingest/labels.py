@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import from_json
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.decimal_commas import has_decimal_comma
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import (
     MAX_NAME,
@@ -29,7 +30,6 @@ from headimpact_service.ingest.json_faults import payload_errors
 from headimpact_service.ingest.times import TimeError, instant
 
 _PRINTABLE = re.compile(PRINTABLE)
-_DECIMAL_COMMA = re.compile(r"[0-9]+,([0-9]{1,2}|[0-9]{4,})")
 Texts = tuple[tuple[str, str], ...]
 """Fields and their cells, those that are empty left out."""
 
@@ -51,8 +51,8 @@ def _location(value: Any) -> Any:  # noqa: ANN401 - validated after
 
 
 def _point(value: Any) -> Any:  # noqa: ANN401 - validated after
-    """A number with a decimal comma that cannot group thousands, with a point."""
-    return value.replace(",", ".") if isinstance(value, str) and _DECIMAL_COMMA.fullmatch(value) else value
+    """A number with a decimal comma, with a point."""
+    return value.replace(",", ".") if isinstance(value, str) and has_decimal_comma(value) else value
 
 
 class Reading(Strict):

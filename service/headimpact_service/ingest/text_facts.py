@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.decimal_commas import CLEAR
 
 MAX_LINE = 256 * 1024
 UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 """How a spreadsheet's "Unicode text" begins."""
 
 DELIMITERS = (",", ";", "\t")
-_NUMBER = rb"[+-]?(?:0,[0-9]+|[0-9]+,(?:[0-9]{1,2}|[0-9]{4,}))(?:[eE][+-]?[0-9]+)?"
-_BARE = re.compile(rb"(?:^|[;\t\r\n])" + _NUMBER + rb"(?=[;\t\r\n]|$)")
-_IN_QUOTES = re.compile(rb'"' + _NUMBER + rb'"')
+_BARE = re.compile(rf"(?:^|[;\t\r\n]){CLEAR}(?=[;\t\r\n]|$)".encode())
+_IN_QUOTES = re.compile(f'"{CLEAR}"'.encode())
 
 
 @dataclass(frozen=True, slots=True)
