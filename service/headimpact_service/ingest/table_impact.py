@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 from itertools import groupby
@@ -17,10 +16,10 @@ from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
-from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
 from headimpact_service.ingest.formula_cells import unguarded, unguarded_name
 from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass, mounting
+from headimpact_service.ingest.impact_times import ImpactTimes
 from headimpact_service.ingest.labels import (
     NOTHING_SAID,
     Reading,
@@ -29,28 +28,12 @@ from headimpact_service.ingest.labels import (
     moment,
     reading_of,
 )
-from headimpact_service.ingest.layout import Clock, SignalLayout
-from headimpact_service.ingest.mapping import Mapping
-from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows
-from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, numbers_of
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """How one table is read: its mapping, where that came from, and what the sender overrides."""
-
-    mapping: Mapping
-    preset: str | None
-    required: frozenset[str]
-    options: ImportOptions
-    format: str
-    named: NamedFacts = NOT_NAMED
 
 
 class TableImpact:
@@ -68,6 +51,7 @@ class TableImpact:
         self.cell = first if window.columns.lengths is None else number
         alike = samples.are_alike(self.rows)
         self.labels = RowLabels(self.layout, samples.texts, self.rows, self.cell, self.row, alike)
+        self.times = ImpactTimes(plan, samples, self.rows, self.row)
         self.notes: list[QualityNote] = []
 
     def record(self) -> ImpactRecord:
@@ -117,15 +101,15 @@ class TableImpact:
     def _recording(self, *, scorable: bool) -> Recording:
         mapping, options, reading = self.mapping, self.options, self.reading
         fill_gaps = options.fill_gaps or reading.fill_gaps or bool(mapping.fill_gaps)
-        self._require_counted(allow_gaps=fill_gaps)
-        self._require_one_time()
+        self.times.require_counted(allow_gaps=fill_gaps)
+        self.times.require_one_time()
         tracks = self._tracks()
         # The signals before the drop say when the record began, those after it when what is kept begins.
         kept = [self._without_first(track) for track in tracks]
         for whole, track in zip(tracks, kept, strict=True):
-            self._require_times(whole)
+            self.times.require_times(whole)
             if scorable and not fill_gaps:
-                self._require_samples(track)
+                self.samples.require_finite(self.layout.signals[track.name].columns, track.rows, self.row)
         signals: dict[str, Any] = {
             track.name: self._signal(track, base) for track, base in zip(kept, time_bases(kept), strict=True)
         }
@@ -135,7 +119,7 @@ class TableImpact:
             mounting=self._mounting(),
             constrained_plane=reading.constrained_plane or mapping.constrained_plane,
             low_pass=options.low_pass or (PAPER if chosen is None else low_pass(chosen)),
-            pre_trigger_ms=self._pre_trigger_ms(tracks, kept),
+            pre_trigger_ms=self.times.pre_trigger_ms(tracks, kept, reading),
             fill_gaps=fill_gaps,
             **signals,
         )
@@ -159,14 +143,14 @@ class TableImpact:
     def _tracks(self) -> list[Track]:
         """The rows of each signal: all of the impact's, unless these are parted by time base."""
         if self.layout.time_base is None:
-            whole = [self._track(name, self.rows, self.reading) for name in self._present()]
+            whole = [self.times.track(name, self.rows, self.reading) for name in self._present()]
             self._note_end(whole)
             return whole
         tracks: list[Track] = []
         for rows in self._parts(self.layout.time_base):
             reading = self._reading_at(rows.start if isinstance(rows, slice) else rows[0])
             tracks += [
-                self._track(name, rows, reading)
+                self.times.track(name, rows, reading)
                 for name, values in self.samples.signals.items()
                 if not np.isnan(values[rows]).all()
             ]
@@ -205,100 +189,6 @@ class TableImpact:
             part = [row for row, _ in run]
             yield slice(part[0], part[-1] + 1) if part[-1] - part[0] + 1 == len(part) else part
 
-    def _track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
-        signal = self.layout.signals[name]
-        clock = signal.clock or self.layout.clock
-        if self.layout.ends_alone(name) or self.samples.has_ends:
-            rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
-        rate = self._said_rate(signal, reading)
-        if clock is None or (rate is not None and self._stands_still(clock, rows)):
-            return self._counted(Track(name, rows, rate or self.mapping.sample_rate_hz, None, 1.0))
-        stamps = self._stamps(clock.column, rows)
-        if rate is not None and (signal.clock is not None or not signal.is_apart):
-            _require_on_time(stamps * clock.milliseconds, rate)
-        return Track(name, rows, rate, stamps, clock.milliseconds)
-
-    def _said_rate(self, signal: SignalLayout, reading: Reading) -> float | None:
-        """The rate that the sender, the impact's row or the mapping says; 422 where they differ.
-
-        A signal that has a rate of its own, and no times, does not go by those that the others share.
-        """
-        asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
-        beside, own = self.options.sample_rate_hz, signal.sample_rate_hz if signal.clock is None else None
-        _require_one_rate([beside, own] if own else [beside, reading.sample_rate_hz, asked])
-        return own or beside or reading.sample_rate_hz or signal.sample_rate_hz or asked
-
-    def _stands_still(self, clock: Clock, rows: Rows) -> bool:
-        """Whether a column of times says when the impact was, and not its samples."""
-        stamps = self._stamps(clock.column, rows)
-        return stamps.size > 1 and bool((stamps == stamps[0]).all())
-
-    def _counted(self, track: Track) -> Track:
-        """A track of a rate, on stamps where the file's own numbers leave out samples."""
-        column = self.layout.sample_number
-        if column is None or track.rate is None or (np.diff(self.samples.numbers[column][track.rows]) == 1).all():
-            return track
-        return Track(track.name, track.rows, None, self._stamps(column, track.rows), 1000.0 / track.rate)
-
-    def _stamps(self, column: int, rows: Rows) -> FloatArray:
-        """The stamps of rows; signals that share both share the array."""
-        key = (column, rows.start, rows.stop) if isinstance(rows, slice) else (column, rows[0], rows[-1])
-        return self._kept_stamps.setdefault(key, self.samples.numbers[column][rows])
-
-    @cached_property
-    def _kept_stamps(self) -> dict[tuple[int, int, int], FloatArray]:
-        return {}
-
-    def _until_empty(self, signal: SignalLayout, clock: int | None, rows: Rows) -> Rows:
-        """A signal's rows without those behind its end, which the columns of a longer one go on beside."""
-        columns = signal.columns if clock is None else [clock, *signal.columns]
-        there = np.logical_or.reduce([~np.isnan(self.samples.numbers[column][rows]) for column in columns])
-        count = int(np.flatnonzero(there)[-1]) + 1 if there.any() else 0
-        return slice(rows.start, rows.start + count) if isinstance(rows, slice) else rows[:count]
-
-    def _require_counted(self, *, allow_gaps: bool) -> None:
-        """Refuse samples that the file's own numbers say are out of order, or missing unless gaps are to be filled."""
-        column = self.layout.sample_number
-        if column is None:
-            return
-        numbers = self.samples.numbers[column][self.rows]
-        self.samples.require_finite([column], self.rows, self.row)
-        steps = np.diff(numbers)
-        stray = np.flatnonzero(steps <= 0 if allow_gaps else steps != 1)
-        if stray.size:
-            before, after = numbers[stray[0] : stray[0] + 2].tolist()
-            raise file_fault(
-                f"Sample {after:g} follows sample {before:g} in the impact that begins in row "
-                f"{self.row + 1} below the headings: some are missing or out of order.",
-                "sample-order",
-            )
-
-    def _require_one_time(self) -> None:
-        """Refuse two columns of times that say different things."""
-        clock = self.layout.clock
-        for other in self.layout.other_clocks:
-            assert clock is not None
-            one, two = (self.samples.numbers[found.column][self.rows] * found.milliseconds for found in (clock, other))
-            if not agree(one, two):
-                raise file_fault(
-                    f"Columns {clock.column + 1} and {other.column + 1} both give the times and do not agree: say in a "
-                    "mapping which to take.",
-                    "times-differ",
-                )
-
-    def _require_times(self, track: Track) -> None:
-        """Refuse a missing time."""
-        clock = self.layout.signals[track.name].clock or self.layout.clock
-        if clock is not None and track.rate is None:
-            self._require_finite([clock.column], track)
-
-    def _require_samples(self, track: Track) -> None:
-        """Refuse a missing sample."""
-        self._require_finite(self.layout.signals[track.name].columns, track)
-
-    def _require_finite(self, columns: list[int], track: Track) -> None:
-        self.samples.require_finite(columns, track.rows, self.row)
-
     def _without_first(self, track: Track) -> Track:
         """A track without the samples that the layout calls corrupt, which is noted once."""
         dropped = self.mapping.drop_rows or 0
@@ -311,45 +201,6 @@ class TableImpact:
         kept: Rows = slice(rows.start + dropped, rows.stop) if isinstance(rows, slice) else rows[dropped:]
         stamps = None if track.stamps is None else track.stamps[dropped:]
         return Track(track.name, kept, track.rate, stamps, track.milliseconds)
-
-    def _pre_trigger_ms(self, tracks: list[Track], kept: list[Track]) -> float | None:
-        """The time before the trigger: as said for this impact or by the sender, by the stamps, or by the layout."""
-        if "pre_trigger_ms" in self.layout.reading:  # an empty cell says that it is not known
-            told = self.reading.pre_trigger_ms
-            return self.mapping.pre_trigger_ms if told is None else told
-        stated = self.mapping.pre_trigger_ms
-        if stated is not None:
-            stated = max(0.0, round(stated - self._dropped_ms(tracks, kept), 9))
-        self._require_longer(kept, stated)
-        spans = [span for track in kept if (span := track.span_ms) is not None]
-        if not spans or "pre_trigger_ms" in self.plan.required or self.mapping.zero == "record_start":
-            return stated
-        before = before_zero_ms(spans)
-        if before is None and self.mapping.zero == "trigger":
-            if min(spans)[0] != 0.0:
-                detail = "The record's times must include zero, which its layout says is the trigger."
-                raise file_fault(detail, "time-zero")
-            return 0.0
-        return stated if before is None else before
-
-    def _require_longer(self, tracks: list[Track], before_ms: float | None) -> None:
-        """Refuse a record that is over before its trigger: it is not of this layout."""
-        lengths = [1000.0 * len(numbers_of(track.rows)) / track.rate for track in tracks if track.rate is not None]
-        if before_ms is not None and lengths and len(lengths) == len(tracks) and max(lengths) < before_ms:
-            raise file_fault(
-                f"The record of {max(lengths):g} ms is over before its trigger, which its layout puts at "
-                f"{before_ms:g} ms.",
-                "time-zero",
-            )
-
-    def _dropped_ms(self, tracks: list[Track], kept: list[Track]) -> float:
-        """How much later than the file's record the one that is kept begins."""
-        if not self.mapping.drop_rows:
-            return 0.0
-        before, after = ([span[0] for t in of if (span := t.span_ms) is not None] for of in (tracks, kept))
-        if before and after:
-            return min(after) - min(before)
-        return min((1000.0 * self.mapping.drop_rows / track.rate for track in kept if track.rate), default=0.0)
 
     def _signal(self, track: Track, base: TimeBase) -> Signal:
         layout = self.layout.signals[track.name]
@@ -391,26 +242,3 @@ class TableImpact:
         """What the file itself calls the impact, where that is no name outside it."""
         known = [key for key in keys if key is not None]
         return {"impact": " ".join(known)[:MAX_NAME]} if known else {}
-
-
-def _require_one_rate(said: Iterable[float | None]) -> None:
-    """Refuse rates of one signal that differ by more than what clocks drift."""
-    given = [rate for rate in said if rate is not None]
-    if given and max(given) - min(given) > DRIFT * min(given):
-        raise file_fault(
-            f"The impact is said to have {min(given):g} samples per second and {max(given):g}: leave out the rate that "
-            "is wrong.",
-            "rate-differs",
-            parameter="sample_rate_hz",
-        )
-
-
-def _require_on_time(stamps_ms: FloatArray, rate: float) -> None:
-    """Refuse times that are not those of a rate."""
-    if not follows(stamps_ms[np.isfinite(stamps_ms)], rate):
-        raise file_fault(
-            f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew or "
-            "are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a mapping).",
-            "rate-differs",
-            parameter="sample_rate_hz",
-        )

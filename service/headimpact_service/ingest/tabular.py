@@ -13,12 +13,13 @@ from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.layout import Layout, lay_out
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
+from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.presets import Preset, preset_named, recognise, spoken_of
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
 from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.table import Table
-from headimpact_service.ingest.table_impact import Plan, TableImpact
+from headimpact_service.ingest.table_impact import TableImpact
 from headimpact_service.ingest.windows import Window, windows
 
 
