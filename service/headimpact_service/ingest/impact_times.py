@@ -25,7 +25,7 @@ class ImpactTimes:
         """Take the impact's rows, of which the first is `row` of the table; nothing is read yet."""
         self.plan, self.mapping, self.options = plan, plan.mapping, plan.options
         self.samples, self.layout, self.rows, self.row = samples, samples.layout, rows, row
-        self._kept_stamps: dict[tuple[int, int, int], FloatArray] = {}
+        self._kept_stamps: dict[tuple[int, ...], FloatArray] = {}
 
     def track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
         """A signal's rows with the rate or the stamps that count for them."""
@@ -65,7 +65,8 @@ class ImpactTimes:
 
     def _stamps(self, column: int, rows: Rows) -> FloatArray:
         """The stamps of rows; signals that share both share the array."""
-        key = (column, rows.start, rows.stop) if isinstance(rows, slice) else (column, rows[0], rows[-1])
+        ends = (rows.start, rows.stop) if isinstance(rows, slice) else (*rows[:1], *rows[-1:])
+        key = (column, *ends)
         return self._kept_stamps.setdefault(key, self.samples.numbers[column][rows])
 
     def _until_empty(self, signal: SignalLayout, clock: int | None, rows: Rows) -> Rows:

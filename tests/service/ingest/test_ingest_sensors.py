@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ingest_files import codes, csv_text, one, outcome, refused, six_axis, statuses
+from ingest_files import codes, csv_text, one, outcome, read, refused, six_axis, statuses
 from making import LINX, linx_rows, motion, table
 
+from headimpact.errors import TraceError
 from headimpact.preparation import prepare
 from headimpact.scoring import score
 from headimpact_service.ingest.mapping import Mapping
@@ -136,6 +137,19 @@ class TestOwnTimes:
             assert one(text).recording.linear_acceleration.sample_rate_hz == rate
         else:
             assert codes(refused(text)) == [("sample_rate_hz", said)]
+
+    def test_an_impact_of_empty_cells_between_the_rows_of_another_is_its_own_fault(self):
+        own = {
+            "linear_acceleration": ACCELERATION | {"time": {"column": "ta", "unit": "ms"}},
+            "angular_velocity": VELOCITY | {"time": {"column": "tw", "unit": "ms"}},
+        }
+        whole = [["a", i, *row[:3], i, *row[3:]] for i, row in enumerate(six_axis().tolist())]
+        rows = [row for pair in zip(whole, [["b", *[""] * 8]] * 40, strict=True) for row in pair]
+        text = table(["id", "ta", *SIX[:3], "tw", *SIX[3:]], rows)
+        first, second = read(text, mapping=Mapping.model_validate({"group_by": "id"} | own))
+        assert prepare(first.recording).kinematics.samples == 40
+        with pytest.raises(TraceError, match="3 to 20000 samples"):
+            prepare(second.recording)
 
     def test_a_mounting_of_what_is_not_a_sensor_is_refused(self):
         turned = {"accelerometer": {"rotation": STILL, "offset_mm": [70, 10, -60]}, "gyroscope": {"rotation": STILL}}
