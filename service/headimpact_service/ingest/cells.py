@@ -38,6 +38,11 @@ def is_written_number(cell: str) -> bool:
     return _WRITTEN_NUMBER.fullmatch(cell.strip()) is not None
 
 
+def number_said(cell: str) -> float | None:
+    """The number in a cell; None where it is none."""
+    return float(cell.strip().replace(",", ".")) if is_written_number(cell) else None
+
+
 def number_text(value: float) -> str:
     """A number that is a name, in as few digits as tell it from others: 20.1, and 20 for 20.0."""
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)

@@ -81,6 +81,10 @@ class CsvTable:
         if len(self.headings) > MAX_COLUMNS:
             raise unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
 
+    def has_samples(self, place: int) -> bool:  # noqa: ARG002 - the shape of a table
+        """Any column may."""
+        return True
+
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The columns, block by block, so that only numbers are kept of the numbers."""
         for samples, cells in self._blocks(numbers, texts):

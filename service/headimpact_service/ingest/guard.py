@@ -115,6 +115,11 @@ class GuardedTable:
         self.headings = tuple(str(heading) for heading in fields.fields["headings"])
         self.units = {int(column): str(unit) for column, unit in fields.fields["units"].items()}
         self.parted = bool(fields.fields["parted"])
+        self._sampled = str(fields.fields["sampled"])
+
+    def has_samples(self, place: int) -> bool:
+        """Whether a column may hold a number for each sample."""
+        return self._sampled[place : place + 1] == "1"
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns, block by block."""

@@ -10,7 +10,8 @@ from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest import mapping as mappings
 from headimpact_service.ingest.file_faults import file_fault
-from headimpact_service.ingest.spelling import MAX_COMPACT, compact, without_unit
+from headimpact_service.ingest.spelling import MAX_COMPACT, compact, unit_at_end
+from headimpact_service.ingest.time_headings import sensor_of_times, unit_of_times
 
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 
@@ -158,6 +159,9 @@ class Vocabulary:
             columns = {heading: m for heading, m in found if m.signal == signal}
             if columns:
                 fields[signal] = _signal_columns(signal, columns)
+        for signal, times in self.own_times(headings).items():
+            if signal in fields:
+                fields[signal]["time"] = times
         times = self.time(headings)
         if any(headings.written.count(time.column) > 1 for time in times):  # one before each sensor's own columns
             for found_signal in SIGNALS:
@@ -166,6 +170,16 @@ class Vocabulary:
         elif times:
             fields["time"] = times
         return mappings.Mapping.model_validate(fields)
+
+    def own_times(self, headings: Headings) -> dict[SignalName, list[mappings.TimeColumn]]:
+        """The columns of times that name one signal's sensor, as a time of the gyroscope."""
+        found: dict[SignalName, list[mappings.TimeColumn]] = {}
+        for column, heading in enumerate(headings.written):
+            unit, signal = unit_of_times(heading, headings.units.get(column)), sensor_of_times(heading)
+            if unit is not None and signal is not None:
+                time = mappings.TimeColumn.model_validate({"column": heading, "unit": unit})
+                found.setdefault(signal, []).append(time)
+        return found
 
     def time(self, headings: Headings) -> list[mappings.TimeColumn]:
         """The columns of times that a table's headings name, with their units; of one word, all.
@@ -184,9 +198,9 @@ class Vocabulary:
 
 def _by_last_word(heading: str) -> Iterator[tuple[SignalName, str]]:
     """What is left of a heading that ends in a unit of linear acceleration as a word of its own, without it."""
-    rest = without_unit("linear_acceleration", heading)
-    if rest is not None:
-        yield "linear_acceleration", compact(rest) + "|"
+    at_end = unit_at_end("linear_acceleration", heading)
+    if at_end is not None:
+        yield "linear_acceleration", compact(at_end[0]) + "|"
 
 
 def _axes_of(rest: str) -> Iterator[tuple[str, str]]:

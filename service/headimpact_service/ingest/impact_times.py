@@ -7,15 +7,22 @@ from collections.abc import Iterable
 import numpy as np
 
 from headimpact.recording import SignalName
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import number_said
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.labels import Reading
 from headimpact_service.ingest.layout import Clock, SignalLayout
 from headimpact_service.ingest.plan import Plan
+from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows
+from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows, rounded_to
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import Track
 from headimpact_service.ingest.windows import Rows, numbers_of
+
+OTHER_CLOCK = 0.02
+"""Relative: how far the rate of times that are not read may be from a signal's, being another clock's."""
+MIN_STAMPS = 3
 
 
 class ImpactTimes:
@@ -106,6 +113,30 @@ class ImpactTimes:
                     "times-differ",
                 )
 
+    def require_no_other(self, tracks: list[Track], labels: RowLabels) -> None:
+        """Refuse times and rates beside those that are read at which no signal is: one signal's may be among them."""
+        rates = [rate for track in tracks if (rate := track.samples_per_s) is not None]
+        for rate_column in self.layout.others.rates:
+            said = number_said(labels.said(rate_column.column))
+            if said is not None and not _is_among(said, rates, OTHER_CLOCK):
+                raise _other(rate_column.heading, said)
+        for other in self.layout.others.clocks:
+            self._require_among(other.column, other.milliseconds, other.heading, rates)
+        shared = self.layout.clock
+        if shared is not None and all(signal.is_apart for signal in self.layout.signals.values()):
+            self._require_among(shared.column, shared.milliseconds, "of the shared times", rates)
+
+    def _require_among(self, column: int, milliseconds: float, heading: str, rates: list[float]) -> None:
+        """Refuse times of a rate that no signal has; what does not go on from row to row is no time of samples."""
+        stamps = self.samples.numbers[column][self.rows] * milliseconds
+        stamps = stamps[np.isfinite(stamps)]
+        if stamps.size < MIN_STAMPS or not (np.diff(stamps) > 0.0).all():
+            return
+        span = float(stamps[-1] - stamps[0])
+        said = 1000.0 * (stamps.size - 1) / span
+        if not _is_among(said, rates, OTHER_CLOCK + rounded_to(stamps) / span):
+            raise _other(heading, said)
+
     def require_times(self, track: Track) -> None:
         """Refuse a missing time."""
         clock = self.layout.signals[track.name].clock or self.layout.clock
@@ -150,6 +181,20 @@ class ImpactTimes:
         if before and after:
             return min(after) - min(before)
         return min((1000.0 * self.mapping.drop_rows / track.rate for track in kept if track.rate), default=0.0)
+
+
+def _is_among(said: float, rates: list[float], apart: float) -> bool:
+    return any(abs(said - rate) <= apart * rate for rate in rates)
+
+
+def _other(heading: str, rate: float) -> Problem:
+    return file_fault(
+        f"The column {heading} says {rate:.5g} samples per second, at which no signal is read. If it is one sensor's, "
+        'say so in a mapping, as {"angular_velocity": {"time": {"column": ..., "unit": ...}}} or {"angular_velocity": '
+        '{"sample_rate_hz": ...}}; else name the column that gives the times in its time, or leave this one out.',
+        "rate-differs",
+        parameter="sample_rate_hz",
+    )
 
 
 def _require_one_rate(said: Iterable[float | None]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.mapping import TIME_UNITS, DateAndTime, Mapping, SignalColumns
+from headimpact_service.ingest.other_times import NO_OTHERS, OtherTimes, other_times
 from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.unread import NOTHING_UNREAD, Unread, unread_columns
 
@@ -75,6 +76,8 @@ class Layout:
     unscorable: int | None
     time_base: int | None
     sample_number: int | None
+    others: OtherTimes = NO_OTHERS
+    """What may say other times than those that are read."""
     unread: Unread = NOTHING_UNREAD
     """What may tell that the rows are several impacts, where nothing that is read would."""
 
@@ -96,14 +99,17 @@ class Layout:
         clocks = [clock.column for clock in all_clocks if clock is not None]
         resultants = [signal.resultant for signal in signals if signal.resultant is not None]
         counted = [] if self.sample_number is None else [self.sample_number]
-        return sorted({*clocks, *resultants, *counted, *(column for signal in signals for column in signal.columns)})
+        others = [clock.column for clock in self.others.clocks]
+        components = (column for signal in signals for column in signal.columns)
+        return sorted({*clocks, *resultants, *counted, *others, *components})
 
     @property
     def texts(self) -> list[int]:
         """Columns that are read as text."""
         one_each = (self.external_id, self.athlete, self.device, self.unscorable, self.time_base)
         named = (*one_each, *self.keys, *self.occurred_at, *self.context.values(), *self.reading.values())
-        return sorted({column for column in (*named, *self.unread.columns) if column is not None})
+        others = [rate.column for rate in self.others.rates]
+        return sorted({column for column in (*named, *others, *self.unread.columns) if column is not None})
 
     @property
     def is_timed(self) -> bool:
@@ -115,6 +121,10 @@ class Layout:
         if self.signals[name].is_apart:
             return True
         return self.clock is None and any(signal.is_apart for signal in self.signals.values())
+
+    def beside(self, headings: Headings, has_samples: Callable[[int], bool]) -> Layout:
+        """The same, with the columns beside it that may say other times."""
+        return replace(self, others=other_times(headings, {*self.numbers, *self.texts}, has_samples))
 
     def watching(self, headings: Headings) -> Layout:
         """The same, with the columns beside it that may tell several impacts from one."""

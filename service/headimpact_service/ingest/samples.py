@@ -21,7 +21,8 @@ class Samples:
         self.layout, self.window, self.texts, self.numbers = layout, window, columns.texts, columns.numbers
         self.signals = {name: _assembled(signal, columns) for name, signal in layout.signals.items()}
         self._changes = self._changed(layout)
-        self.is_whole = all(bool(np.isfinite(numbers).all()) for numbers in columns.numbers.values())
+        beside = {clock.column for clock in layout.others.clocks}
+        self.is_whole = all(np.isfinite(columns.numbers[place]).all() for place in columns.numbers.keys() - beside)
 
     def _changed(self, layout: Layout) -> NDArray[np.intp] | None:
         """How often what rows say of their impact has changed, row by row; None where nothing is said in rows."""

@@ -49,17 +49,17 @@ def unit_spelled(signal: str, text: str | None) -> str | None:
 
 
 @cache
-def _written(signal: str) -> tuple[str, ...]:
-    """A signal's units as they are written, the longest first."""
-    units = _vocabulary()[signal]["units"].values()
-    return tuple(sorted({spelling for spellings in units for spelling in spellings}, key=len, reverse=True))
+def _written(quantity: str) -> tuple[tuple[str, str], ...]:
+    """Spellings of a quantity's units as they are written, the longest first, each with its unit."""
+    units = _vocabulary()[quantity]["units"].items()
+    return tuple(sorted(((text, unit) for unit, texts in units for text in texts), key=lambda said: -len(said[0])))
 
 
-def without_unit(signal: str, heading: str) -> str | None:
-    """What stands before a unit of a signal that ends a heading as a word of its own; None where none does."""
+def unit_at_end(quantity: str, heading: str) -> tuple[str, str] | None:
+    """What stands before a unit of a quantity that ends a heading as a word of its own, and that unit."""
     text = unicodedata.normalize("NFKC", heading[:MAX_COMPACT]).casefold().replace("^", "").rstrip(" )]")
-    for unit in _written(signal):
-        rest = text.removesuffix(unit)
+    for spelling, unit in _written(quantity):
+        rest = text.removesuffix(spelling)
         if rest != text and rest and not rest[-1].isalnum():
-            return rest
+            return rest, unit
     return None

@@ -17,6 +17,8 @@ ROUNDED_TO_MS = (1.0, 0.1, 0.01)
 """What stamps are written to."""
 NEAR, DRIFT = 0.6, 0.005
 """How far a stamp may be from where a stated rate has its sample: in samples, and by what went by since the first."""
+SURE = 4.0
+"""Standard errors of a rate that stamps say."""
 SAME_RATE: float = QUALITY_LIMITS["record"]["same_rate"]
 """Relative: rates that stamps say and that differ less are one rate."""
 UNIFORM_JITTER: float = QUALITY_LIMITS["record"]["uniform_jitter"]
@@ -54,12 +56,27 @@ def before_zero_ms(spans: Iterable[tuple[float, float]]) -> float | None:
 
 
 def follows(stamps_ms: FloatArray, rate_hz: float, *, drift: float = DRIFT) -> bool:
-    """Whether stamps [ms] go on at a rate, sample by sample, as far as they are rounded and clocks drift."""
+    """Whether stamps [ms] go on at a rate, one by one and as a whole, as far as they are rounded and clocks drift."""
     if not stamps_ms.size:
         return True
-    elapsed = np.arange(stamps_ms.size) * 1000.0 / rate_hz
+    step = 1000.0 / rate_hz
+    elapsed = np.arange(stamps_ms.size) * step
     stray = np.abs(stamps_ms - stamps_ms[0] - elapsed)
-    return bool((stray <= NEAR * 1000.0 / rate_hz + _rounded_to(stamps_ms) + drift * elapsed).all())
+    near = bool((stray <= NEAR * step + rounded_to(stamps_ms) + drift * elapsed).all())
+    return near and _steps_by(stamps_ms, step, drift)
+
+
+def _steps_by(stamps_ms: FloatArray, step_ms: float, drift: float) -> bool:
+    """Whether the line through stamps is as steep as a step; rounding and jitter leave it less sure."""
+    count = stamps_ms.size
+    if count < 3:
+        return True
+    places = np.arange(count) - 0.5 * (count - 1)
+    spread = float((places**2).sum())
+    slope = float((places * stamps_ms).sum() / spread)
+    strays = stamps_ms - stamps_ms.mean() - slope * places
+    error = float(np.sqrt((strays**2).sum() / (count - 2) / spread))
+    return abs(slope - step_ms) <= drift * step_ms + SURE * error
 
 
 def agree(first_ms: FloatArray, second_ms: FloatArray) -> bool:
@@ -69,10 +86,10 @@ def agree(first_ms: FloatArray, second_ms: FloatArray) -> bool:
     if one.size < 2:
         return True
     step = min(abs(float(np.median(np.diff(stamps)))) for stamps in (one, two))
-    return bool((np.abs(one - two) <= NEAR * step + max(_rounded_to(one), _rounded_to(two))).all())
+    return bool((np.abs(one - two) <= NEAR * step + max(rounded_to(one), rounded_to(two))).all())
 
 
-def _rounded_to(stamps_ms: FloatArray) -> float:
+def rounded_to(stamps_ms: FloatArray) -> float:
     """What all stamps are multiples of, of what they may be written to; zero for anything finer."""
     return next((grid for grid in ROUNDED_TO_MS if _are_multiples(stamps_ms, grid)), 0.0)
 

@@ -43,5 +43,8 @@ class Table(Protocol):
     def parted(self) -> bool:
         """Whether the format itself parts the impacts, so that every block has `lengths`."""
 
+    def has_samples(self, place: int) -> bool:
+        """Whether a column may hold a number for each sample; one that does not may be read as text."""
+
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns in the order of their rows; 422 where a row does not fit the headings."""

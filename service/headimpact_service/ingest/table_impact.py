@@ -104,6 +104,7 @@ class TableImpact:
         self.times.require_counted(allow_gaps=fill_gaps)
         self.times.require_one_time()
         tracks = self._tracks()
+        self.times.require_no_other(tracks, self.labels)
         # The signals before the drop say when the record began, those after it when what is kept begins.
         kept = [self._without_first(track) for track in tracks]
         for whole, track in zip(tracks, kept, strict=True):

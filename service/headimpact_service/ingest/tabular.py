@@ -14,12 +14,12 @@ from headimpact_service.ingest.layout import Layout, lay_out
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.plan import Plan
-from headimpact_service.ingest.presets import Preset, preset_named, recognise, spoken_of
+from headimpact_service.ingest.presets import Preset, preset_named, recognise, spoken_of, timed_by
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.table_impact import TableImpact
+from headimpact_service.ingest.time_headings import speaks_of_times
 from headimpact_service.ingest.windows import Window, windows
 
 
@@ -38,6 +38,8 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     _require_read(layout, headings, options)
     _require_rate(layout, plan)
     _require_no_other_rate(layout, plan, headings)
+    if options.mapping is None or "time" not in options.mapping.model_fields_set:
+        layout = layout.beside(headings, table.has_samples)
     if not (table.parted or _names_one_impact(options)):
         layout = layout.watching(headings)
     blocks = table.blocks(layout.numbers, layout.texts)
@@ -73,7 +75,7 @@ def _plan(headings: Headings, options: ImportOptions, format_name: str) -> Plan:
     asked = options.mapping
     required = frozenset() if asked is None else frozenset(_names_columns(asked))
     if preset is None:
-        return Plan(merge(Mapping.model_construct(), asked), None, required, options, format_name)
+        return Plan(merge(timed_by(headings), asked), None, required, options, format_name)
     named = named_facts(options.filename, preset.file_name, options.time_zone)
     return Plan(merge(preset.mapping_for(headings), asked), preset.name, required, options, format_name, named)
 
@@ -141,15 +143,6 @@ def _require_rate(layout: Layout, plan: Plan) -> None:
         )
 
 
-_TIMES_OR_RATES = frozenset(
-    {
-        *("t", "time", "times", "timestamp", "timestamps", "tms", "ts", "timems", "timesec", "tsec"),
-        *("rate", "samplefrequency", "frequency", "freq", "hz", "dt", "samplinginterval", "sampleinterval"),
-    }
-)
-"""Names of times and rates, as :func:`compact` has them."""
-
-
 def _require_no_other_rate(layout: Layout, plan: Plan, headings: Headings) -> None:
     """Refuse to take a device's usual rate where the file seems to say its own, in a way that is not read."""
     usual = plan.mapping.sample_rate_hz is not None and "sample_rate_hz" not in plan.required
@@ -157,7 +150,7 @@ def _require_no_other_rate(layout: Layout, plan: Plan, headings: Headings) -> No
         return
     unread = set(range(len(headings.written))) - {*layout.numbers, *layout.texts}
     for column in sorted(unread):
-        if compact(headings.written[column]) in _TIMES_OR_RATES:
+        if speaks_of_times(headings.written[column]):
             raise file_fault(
                 f"The column {headings.written[column]} seems to say times or a rate and is not read: name it in a "
                 f"mapping's time, with its unit, or give sample_rate_hz beside the file ({plan.preset} would take "

@@ -30,6 +30,14 @@ class Track:
             return None
         return float(self.stamps[0]) * self.milliseconds, float(self.stamps[-1]) * self.milliseconds
 
+    @property
+    def samples_per_s(self) -> float | None:
+        """The rate, as it is stated or as the stamps have it on average [Hz]."""
+        span = self.span_ms
+        if self.rate is not None or self.stamps is None or span is None or not span[0] < span[1] < np.inf:
+            return self.rate
+        return 1000.0 * (self.stamps.size - 1) / (span[1] - span[0])
+
 
 _UNSCALED = {1.0, 1000.0}
 TimeBase = tuple[float | None, FloatArray | None]

@@ -183,12 +183,21 @@ def test_two_columns_of_times_that_do_not_agree_are_refused(other):
 
 
 def test_an_event_s_stamps_beside_the_samples_times_are_no_second_clock():
-    record = one(twice_timed(lambda n: 1.7e12 + 7.0 * n, heading="timestamp_s", first="t_ms"))
+    record = one(twice_timed(lambda n: 1.7e12, heading="timestamp_s", first="t_ms"))
     assert record.recording.pre_trigger_ms == 10.0
 
 
 @pytest.mark.parametrize(
-    "heading", ["Zeit [s]", "elapsed (s)", "Elapsed Time (s)", "Time from trigger (s)", "rel_time_s"]
+    "heading",
+    [
+        "Zeit [s]",
+        "elapsed (s)",
+        "Elapsed Time (s)",
+        "Time from trigger (s)",
+        "rel_time_s",
+        "Time After Impact (s)",
+        "t in s",
+    ],
 )
 def test_times_have_many_names(heading):
     record = one(csv_text(heading=GENERIC.replace("t_s", heading)))

@@ -450,6 +450,14 @@ def test_a_named_preset_may_lack_a_whole_signal_but_not_a_part_of_one():
     assert codes(problem) == [("/angular_velocity/y", "column-missing")]
 
 
+@pytest.mark.parametrize(("begins_ms", "before_ms"), [(0, None), (-10, 10.0)])
+def test_headsports_times_count_from_the_start_unless_they_span_the_trigger(begins_ms: int, before_ms: float | None):
+    rows = [f"{(begins_ms + n) / 1000},0,{n},0,{n % 7},1,{n % 5}" for n in range(40)]
+    record = one("\n".join(["t_s,GX_rad_s,GY_rad_s,GZ_rad_s,AX_g,AY_g,AZ_g", *rows]))
+    assert record.metadata["preset"] == "headsport"
+    assert record.recording.pre_trigger_ms == before_ms
+
+
 def test_a_named_preset_that_does_not_fit_is_refused():
     assert codes(refused(csv_text(), preset="swa")) == [("mapping", "layout-unknown")]
     assert "another kind of file" in refused(csv_text(), preset="nhtsa").detail

@@ -215,6 +215,10 @@ class TestRates:
             {"t": T_2KHZ[:, None] * 1000.0},
             {"time": np.tile(T_2KHZ, (3, 1))},
             {"rate": 2000.0},
+            {"frequency_hz": 2000.0},
+            {"fs_khz": 2.0},
+            {"tvec": T_2KHZ},
+            {"sampling_interval_us": 500.0},
             {"dt": np.full((3, 1), 0.0005)},
         ],
     )

@@ -121,7 +121,9 @@ class TestOwnTimes:
         ("rate", "stamps", "said"),
         [
             (1000.0, lambda i: i, None),
-            (1010.0, lambda i: i, None),
+            (1004.0, lambda i: i, None),
+            (1010.0, lambda i: i, "rate-differs"),
+            (1020.0, lambda i: i, "rate-differs"),
             (3200.0, lambda i: round(i / 3.2), None),  # written to the millisecond
             (1600.0, lambda i: round(i / 1.6) / 1000 * 1000, None),
             (3200.0, lambda i: i, "rate-differs"),

@@ -64,6 +64,10 @@ class ArrayTable:
         if any(array.impacts != self._impacts for array in self._samples):
             raise unreadable("The arrays of samples differ in their number of impacts.")
 
+    def has_samples(self, place: int) -> bool:
+        """An array of samples does, a fact does not."""
+        return place < len(self._columns)
+
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """Some impacts at a time."""
         self._require_numbers(numbers, texts)

@@ -55,6 +55,11 @@ class ArrowTable:
             timed = (place for place, kind in enumerate(self._types) if is_time(kind))
             self.units = dict.fromkeys(timed, MICROSECONDS) | self.units
 
+    def has_samples(self, place: int) -> bool:
+        """Where rows are impacts, lists of numbers do; where they are samples, numbers and times."""
+        kind = self._types[place]
+        return is_list_of_numbers(kind) if self.parted else is_number(kind) or is_time(kind)
+
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns; those of lists end to end, with the length of each impact."""
         wanted = sorted({*numbers, *texts})

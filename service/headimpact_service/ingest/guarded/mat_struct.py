@@ -42,6 +42,10 @@ class StructTable:
                 self._columns.append((name, part))
         self.headings = checked_headings(headings)
 
+    def has_samples(self, place: int) -> bool:
+        """A field of columns does."""
+        return self._columns[place][1] is not None
+
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """Some impacts at a time."""
         held: list[tuple[dict[int, FloatArray], dict[int, str], int]] = []

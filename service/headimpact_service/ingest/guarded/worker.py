@@ -113,7 +113,8 @@ def _offer(connection: socket.socket, content: NamedTable) -> bool:
     table = content.table
     units = {str(column): unit for column, unit in table.units.items()}
     shown = {"name": content.name, "headings": table.headings, "units": units, "parted": table.parted}
-    send(connection, Frame("table", shown))
+    sampled = "".join("1" if table.has_samples(place) else "0" for place in range(len(table.headings)))
+    send(connection, Frame("table", shown | {"sampled": sampled}))
     wanted = receive(connection, Deadline(None))
     if wanted.kind != "read":
         return wanted.kind == "skip"

@@ -110,6 +110,10 @@ class SheetTable:
         self._places = [(block, place) for block in blocks for place in range(len(block.columns))]
         self._rows = max(len(block.rows) for block in blocks)
 
+    def has_samples(self, place: int) -> bool:  # noqa: ARG002 - the shape of a table
+        """Any column may."""
+        return True
+
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns."""
         columns = {place: self._numbers(place) for place in numbers}

@@ -1,0 +1,66 @@
+"""Columns beside those that are read whose headings speak of times or of rates: the signals must not gainsay them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+from headimpact_service.ingest.headings import Headings
+from headimpact_service.ingest.mapping import TIME_UNITS
+from headimpact_service.ingest.spelling import compact
+from headimpact_service.ingest.time_headings import unit_of_times
+
+_RATES = ("samplerate", "samplingrate", "samplefrequency", "samplingfrequency")
+
+
+@dataclass(frozen=True, slots=True)
+class OtherClock:
+    """A column of stamps that no signal is read by; `milliseconds` are those of one unit of them."""
+
+    column: int
+    heading: str
+    milliseconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class OtherRate:
+    """A column of samples per second that no signal is read by."""
+
+    column: int
+    heading: str
+
+
+@dataclass(frozen=True, slots=True)
+class OtherTimes:
+    """The columns of times and of rates that are not read."""
+
+    clocks: tuple[OtherClock, ...] = ()
+    rates: tuple[OtherRate, ...] = ()
+
+
+NO_OTHERS = OtherTimes()
+
+
+def other_times(headings: Headings, read: Collection[int], has_samples: Callable[[int], bool]) -> OtherTimes:
+    """The columns of times and of rates beside those that are read.
+
+    Parameters
+    ----------
+    headings
+        The table's headings.
+    read
+        The columns that are read.
+    has_samples
+        Whether a column may hold a number for each sample.
+    """
+    clocks: list[OtherClock] = []
+    rates: list[OtherRate] = []
+    for column, heading in enumerate(headings.written):
+        if column in read:
+            continue
+        unit = unit_of_times(heading, headings.units.get(column))
+        if unit is not None and has_samples(column):
+            clocks.append(OtherClock(column, heading, TIME_UNITS[unit]))
+        elif any(name in compact(heading) for name in _RATES):
+            rates.append(OtherRate(column, heading))
+    return OtherTimes(tuple(clocks), tuple(rates))

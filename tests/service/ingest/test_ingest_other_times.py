@@ -1,0 +1,161 @@
+"""Columns of times and rates beside those that are read: one sensor's own, or none of the samples'."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from binary_files import COLUMNS, npz, pa, parquet
+from ingest_files import codes, one, refused, six_axis
+from making import table
+
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.record import ImpactRecord
+
+SHARED, GYRO = 1.0, 0.5
+SIX = list(COLUMNS)
+
+
+def timed(heading: str, other: Callable[[int], Any] = lambda n: GYRO * n, first: str = "t_ms") -> str:
+    """The usual table with its times, and another column of times before the gyroscope's."""
+    rows = [[SHARED * n, *row[:3], other(n), *row[3:]] for n, row in enumerate(six_axis().tolist())]
+    return table([first, *SIX[:3], heading, *SIX[3:]], rows)
+
+
+def rates(record: ImpactRecord) -> list[float]:
+    return [
+        signal.sample_rate_hz or round(1.0 / float(np.diff(signal.time_s).mean()), 6)
+        for _, signal in record.recording.signals()
+    ]
+
+
+def gyro_time(heading: str, unit: str = "ms") -> Mapping:
+    return Mapping.model_validate({"angular_velocity": {"time": {"column": heading, "unit": unit}}})
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "Gyro Time (ms)",
+        "t_gyro_ms",
+        "gyro_time_ms",
+        "Time_ARS (ms)",
+        "Angular Time (ms)",
+        "GyroTime_ms",
+        "time ang [ms]",
+    ],
+)
+def test_times_that_name_a_sensor_are_its_own(heading: str):
+    assert rates(one(timed(heading))) == [1000.0, 2000.0]
+
+
+def test_each_sensor_may_have_times_and_none_be_shared():
+    assert rates(one(timed("Gyro Time (ms)", first="Accel Time (ms)"))) == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    ("heading", "unit", "factor"),
+    [("Time 2 (ms)", "ms", 1), ("t2_ms", "ms", 1), ("t_b_us", "us", 1000), ("Elapsed B (s)", "s", 0.001)],
+)
+def test_times_at_which_no_signal_is_read_are_refused_until_a_mapping_says_whose(
+    heading: str, unit: str, factor: float
+):
+    text = timed(heading, lambda n: round(GYRO * n * factor, 9))
+    problem = refused(text)
+    assert codes(problem) == [("sample_rate_hz", "rate-differs")]
+    assert f"The column {heading} says 2000 samples per second" in problem.detail
+    assert rates(one(text, mapping=gyro_time(heading, unit))) == [1000.0, 2000.0]
+    shared = Mapping.model_validate({"time": {"column": "t_ms", "unit": "ms"}})
+    assert rates(one(text, mapping=shared)) == [1000.0, 1000.0]
+
+
+def test_a_preset_s_table_with_times_of_one_sensor_is_refused_too():
+    names = ["time_ms", "Ah_x", "Ah_y", "Ah_z", "time_gyro_ms", "W_x", "W_y", "W_z"]
+    rows = [[SHARED * n, *row[:3], GYRO * n, *row[3:]] for n, row in enumerate(six_axis().tolist())]
+    text = table(names, rows)
+    assert codes(refused(text, preset="biocore")) == [("sample_rate_hz", "rate-differs")]
+    assert rates(one(text, preset="biocore", mapping=gyro_time("time_gyro_ms"))) == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize("form", ["lists", "rows", "npz"])
+def test_it_is_the_same_in_every_format(form: str):
+    values, steps = six_axis(), np.arange(40)
+    columns: dict[str, Any] = {"t_ms": SHARED * steps, "t2_ms": GYRO * steps} | dict(zip(SIX, values.T, strict=True))
+    data = {
+        "rows": lambda: parquet(pa.table(columns)),
+        "lists": lambda: parquet(pa.table({name: [column] for name, column in columns.items()})),
+        "npz": lambda: npz(**columns),
+    }[form]()
+    assert codes(refused(data)) == [("sample_rate_hz", "rate-differs")]
+    assert rates(one(data, mapping=gyro_time("t2_ms"))) == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        lambda n: 12.5,  # the time of a peak
+        lambda n: 1.7e12 + n,  # the same clock, counted from 1970
+        lambda n: 1.7e12 + 1.01 * n,  # another clock, which is slower
+        lambda n: "" if n else 3.0,
+        lambda n: "13:04:05",
+        lambda n: [5.0, 4.0][n % 2],
+    ],
+)
+def test_what_is_no_other_clock_of_the_samples_is_passed_over(other: Callable[[int], Any]):
+    assert rates(one(timed("Event Time (ms)", other))) == [1000.0, 1000.0]
+
+
+@pytest.mark.parametrize(
+    "heading", ["gyro_sample_rate_hz", "angular_velocity_sample_rate_hz", "Sampling Frequency (Hz)"]
+)
+def test_a_rate_at_which_no_signal_is_read_is_refused(heading: str):
+    def with_rate(rate: float) -> str:
+        return table(["t_ms", *SIX, heading], [[n, *row, rate] for n, row in enumerate(six_axis().tolist())])
+
+    problem = refused(with_rate(2000))
+    assert codes(problem) == [("sample_rate_hz", "rate-differs")]
+    assert heading in problem.detail
+    assert rates(one(with_rate(1000))) == [1000.0, 1000.0]
+    own = Mapping.model_validate({"angular_velocity": {"sample_rate_hz": 2000}})
+    assert rates(one(with_rate(2000), mapping=own)) == [1000.0, 2000.0]
+
+
+def test_rates_of_each_sensor_in_a_row_an_impact_are_not_mixed_up():
+    lists = dict(zip(SIX, ([column.tolist()] for column in six_axis().T), strict=True))
+    columns: dict[str, Any] = {"sample_rate_hz": [1600.0], "gyro_sample_rate_hz": [2000.0]} | lists
+    assert codes(refused(parquet(pa.table(columns)))) == [("sample_rate_hz", "rate-differs")]
+    own = Mapping.model_validate({"angular_velocity": {"sample_rate_hz": 2000}})
+    assert rates(one(parquet(pa.table(columns)), mapping=own)) == [1600.0, 2000.0]
+
+
+NAMED: dict[str, Any] = {
+    "linear_acceleration": {"unit": "g", "x": "HX", "y": "HY", "z": "HZ"},
+    "angular_velocity": {"unit": "rad/s", "x": "RX", "y": "RY", "z": "RZ"},
+}
+
+
+@pytest.mark.parametrize(("heading", "scale"), [("Time (ms)", 1.0), ("t_s", 0.001), ("time_us", 1000.0)])
+def test_a_mapping_of_signals_leaves_the_file_s_own_times_in_force(heading: str, scale: float):
+    rows = [[round((n - 10) * scale, 9), *row] for n, row in enumerate(six_axis().tolist())]
+    text = table([heading, "HX", "HY", "HZ", "RX", "RY", "RZ"], rows)
+    record = one(text, mapping=Mapping.model_validate(NAMED))
+    assert rates(record) == [1000.0, 1000.0]
+    assert record.recording.pre_trigger_ms == 10.0
+    assert codes(refused(text, mapping=Mapping.model_validate(NAMED), sample_rate_hz=2000.0)) == [
+        ("sample_rate_hz", "rate-differs")
+    ]
+    without = Mapping.model_validate(NAMED | {"time": None})
+    assert rates(one(text, mapping=without, sample_rate_hz=2000.0)) == [2000.0, 2000.0]
+
+
+def test_rates_of_both_sensors_that_the_shared_times_gainsay_are_refused():
+    own = {"linear_acceleration": {"sample_rate_hz": 2000}, "angular_velocity": {"sample_rate_hz": 2000}}
+    rows = [[n, *row] for n, row in enumerate(six_axis().tolist())]
+    text = table(["t_ms", *SIX], rows)
+    problem = refused(text, mapping=Mapping.model_validate(own))
+    assert codes(problem) == [("sample_rate_hz", "rate-differs")]
+    assert rates(one(text, mapping=Mapping.model_validate(own | {"time": None}))) == [2000.0, 2000.0]
+    own["angular_velocity"]["sample_rate_hz"] = 1000
+    assert rates(one(text, mapping=Mapping.model_validate(own))) == [2000.0, 1000.0]
