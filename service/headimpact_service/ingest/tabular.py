@@ -14,7 +14,7 @@ from headimpact_service.ingest.layout import Layout, lay_out
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.plan import Plan
-from headimpact_service.ingest.presets import Preset, preset_named, recognise, spoken_of, timed_by
+from headimpact_service.ingest.presets import Preset, beside_signals, preset_named, recognise, spoken_of
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
 from headimpact_service.ingest.table import Table
@@ -75,7 +75,7 @@ def _plan(headings: Headings, options: ImportOptions, format_name: str) -> Plan:
     asked = options.mapping
     required = frozenset() if asked is None else frozenset(_names_columns(asked))
     if preset is None:
-        return Plan(merge(timed_by(headings), asked), None, required, options, format_name)
+        return Plan(merge(beside_signals(headings), asked), None, required, options, format_name)
     named = named_facts(options.filename, preset.file_name, options.time_zone)
     return Plan(merge(preset.mapping_for(headings), asked), preset.name, required, options, format_name, named)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from binary_files import COLUMNS, npz, pa, parquet
-from ingest_files import codes, one, refused, six_axis
+from ingest_files import codes, one, read, refused, six_axis
 from making import table
 
 from headimpact_service.ingest.mapping import Mapping
@@ -148,6 +148,18 @@ def test_a_mapping_of_signals_leaves_the_file_s_own_times_in_force(heading: str,
     ]
     without = Mapping.model_validate(NAMED | {"time": None})
     assert rates(one(text, mapping=without, sample_rate_hz=2000.0)) == [2000.0, 2000.0]
+
+
+def test_a_mapping_of_signals_leaves_the_file_s_names_in_force():
+    headings = ["external_id", "athlete_id", "occurred_at", "t_ms", "HX", "HY", "HZ", "RX", "RY", "RZ"]
+    rows = [
+        [name, athlete, "2026-11-20T19:04:05Z", n, *row]
+        for name, athlete in (("e-1", "p-17"), ("e-2", "p-18"))
+        for n, row in enumerate(six_axis().tolist())
+    ]
+    found = read(table(headings, rows), mapping=Mapping.model_validate(NAMED))
+    assert [(record.external_id, record.athlete_external_id) for record in found] == [("e-1", "p-17"), ("e-2", "p-18")]
+    assert {str(record.occurred_at) for record in found} == {"2026-11-20 19:04:05+00:00"}
 
 
 def test_rates_of_both_sensors_that_the_shared_times_gainsay_are_refused():

@@ -76,7 +76,7 @@ def _with_names(mapping: Mapping, headings: Headings) -> Mapping:
     added: dict[str, Any] = {name: getattr(generic, name) for name in fields if getattr(mapping, name) is None}
     if not mapping.group_by:
         added["group_by"] = generic.group_by
-    if not _has_times(mapping, headings) and (times := timed_by(headings).time):
+    if not _has_times(mapping, headings) and (times := _vocabulary(_generic().name).time(headings)):
         added["time"] = times
     reading = {name: spelled for name, spelled in (generic.reading or {}).items() if headings.find(spelled) is not None}
     if reading:
@@ -116,10 +116,9 @@ def _generic() -> Preset:
     return next(preset for preset in presets().values() if preset.vocabulary is not None)
 
 
-def timed_by(headings: Headings) -> Mapping:
-    """The mapping of a table's times, as far as its headings name them, for signals that are named otherwise."""
-    times = _vocabulary(_generic().name).time(headings)
-    return Mapping.model_validate({"time": times} if times else {})
+def beside_signals(headings: Headings) -> Mapping:
+    """The generic columns of names, times and reading of a table whose signals a mapping names."""
+    return _with_names(Mapping.model_construct(), headings)
 
 
 def spoken_of(headings: Headings) -> dict[SignalName, list[str]]:
