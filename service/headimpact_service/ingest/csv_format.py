@@ -13,13 +13,14 @@ import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import chain, islice
+from itertools import chain, islice, zip_longest
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import LineCells, is_no_number
+from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
 from headimpact_service.ingest.decimal_commas import MIXED, has_comma
 from headimpact_service.ingest.heading_rows import LOOK, top_of
 from headimpact_service.ingest.options import ImportOptions
@@ -78,6 +79,7 @@ class CsvTable:
         self._repeated = [heading.strip() for heading in self.headings]
         self.units: Mapping[int, str] = self._read_units(reader) if has_units else {}
         self._simply_quoted = _simply_quoted(self._delimiter)
+        self.dated, self._elapsed = self._find_dated(), Elapsed()
         if len(self.headings) > MAX_COLUMNS:
             raise unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
 
@@ -117,6 +119,15 @@ class CsvTable:
         self._line += 1
         return dict(enumerate(self._rows(reader, 1)[0]))
 
+    def _find_dated(self) -> frozenset[int]:
+        """The columns of dates with times of day, by the rows that come next."""
+        ahead = list(islice(self._lines, FIRST_ROWS))
+        self._lines = chain(ahead, self._lines)
+        try:
+            return dated_columns(zip_longest(*csv.reader(ahead, delimiter=self._delimiter), fillvalue=""))
+        except csv.Error:  # said with its line where the rows are read
+            return frozenset()
+
     def _first_line(self, skip_rows: int) -> str:
         """The first line that is neither skipped, empty, a comment nor a spreadsheet's `sep=;`."""
         for number, line in enumerate(self._lines):
@@ -153,7 +164,14 @@ class CsvTable:
         if cuts != {len(self.headings) - 1}:
             return None
         try:
-            samples = np.loadtxt(lines, delimiter=self._delimiter, usecols=list(numbers), ndmin=2, comments=None)
+            samples = np.loadtxt(
+                lines,
+                delimiter=self._delimiter,
+                usecols=list(numbers),
+                ndmin=2,
+                comments=None,
+                converters=dict.fromkeys(self.dated, self._elapsed.microseconds),
+            )
         except ValueError:
             return None
         if len(samples) != len(lines):
@@ -163,7 +181,7 @@ class CsvTable:
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
         """A block cell by cell, saying what is wrong with it."""
         full = [fitted for place, row in enumerate(rows) for fitted in self._fitted(row, place, numbers)]
-        samples = np.array([[self._number(row[index]) for index in numbers] for row in full], dtype=np.float64)
+        samples = np.array([[self._value(row[index], index) for index in numbers] for row in full], dtype=np.float64)
         return samples.reshape(len(full), len(numbers)), [[row[index] for row in full] for index in texts]
 
     def _rows(self, reader: Reader, count: int) -> list[list[str]]:
@@ -204,6 +222,9 @@ class CsvTable:
         yield from ([""] * width for _ in range(self._empty_rows))
         self._begun, self._empty_rows = True, 0
         yield row[:width]
+
+    def _value(self, cell: str, column: int) -> float:
+        return self._elapsed.microseconds(cell) if column in self.dated else self._number(cell)
 
     def _number(self, cell: str) -> float:
         """The number in a cell; NaN where there is none, infinite where something else stands."""

@@ -251,6 +251,7 @@ class _Channels:
     """The channels as a table, for a mapping that names them."""
 
     parted = False
+    dated = frozenset[int]()
 
     def __init__(self, data: _Data) -> None:
         """Headings are the channels' codes or, where they have none, their names."""

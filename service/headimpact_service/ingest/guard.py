@@ -114,6 +114,7 @@ class GuardedTable:
         self.name: str | None = fields.fields["name"]
         self.headings = tuple(str(heading) for heading in fields.fields["headings"])
         self.units = {int(column): str(unit) for column, unit in fields.fields["units"].items()}
+        self.dated = frozenset(map(int, fields.fields["dated"]))
         self.parted = bool(fields.fields["parted"])
         self._sampled = str(fields.fields["sampled"])
 

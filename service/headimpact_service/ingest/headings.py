@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,10 +19,16 @@ _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 class Headings:
     """The headings of one table, to be looked up by any of a column's spellings."""
 
-    def __init__(self, headings: Sequence[str], units: Mapping[int, str] | None = None) -> None:
-        """Index the headings as written and as :func:`compact` has them; `units` stand beside them in the file."""
+    def __init__(
+        self, headings: Sequence[str], units: Mapping[int, str] | None = None, dated: Collection[int] = ()
+    ) -> None:
+        """Index the headings as written and as :func:`compact` has them.
+
+        `units` stand beside them in the file; columns that are `dated` need none.
+        """
         self.written = tuple(heading.strip() for heading in headings)
         self.units = units or {}
+        self.dated = dated
         self._exact = _places(self.written)
         self._compact = _places([compact(heading) for heading in self.written])
 
@@ -184,14 +190,15 @@ class Vocabulary:
     def time(self, headings: Headings) -> list[mappings.TimeColumn]:
         """The columns of times that a table's headings name, with their units; of one word, all.
 
-        Of several words the first: a column of the event's timestamp may stand beside the samples' times.
+        Of several words the first, and those in a unit before dates: a column of the event's timestamp may stand beside
+        the samples' times.
         """
-        found: list[tuple[int, mappings.TimeColumn]] = []
-        for heading, said in zip(headings.written, headings.spoken, strict=True):
-            meaning = self.understand(said)
-            if meaning is not None and meaning.signal is None and meaning.unit is not None:
-                column = mappings.TimeColumn.model_validate({"column": heading, "unit": meaning.unit})
-                found.append((self._clocks[compact(said)], column))
+        found: list[tuple[tuple[bool, int], mappings.TimeColumn]] = []
+        for place, (heading, said) in enumerate(zip(headings.written, headings.spoken, strict=True)):
+            meaning, dated = self.understand(said), place in headings.dated
+            if meaning is not None and meaning.signal is None and (dated or meaning.unit is not None):
+                column = mappings.TimeColumn.model_validate({"column": heading, "unit": meaning.unit or "us"})
+                found.append(((dated, self._clocks[compact(said)]), column))
         found.sort(key=lambda ranked: ranked[0])
         return list({column.column: column for rank, column in found if rank == found[0][0]}.values())
 

@@ -46,7 +46,7 @@ class ImpactTimes:
         stamps = self._stamps(clock.column, rows)
         if rate is not None and (signal.clock is not None or not signal.is_apart):
             _require_on_time(stamps * clock.milliseconds, rate)
-        return Track(name, rows, rate, stamps, clock.milliseconds)
+        return Track(name, rows, rate, stamps, clock.milliseconds, clock.dated)
 
     def _said_rate(self, signal: SignalLayout, reading: Reading) -> float | None:
         """The rate that the sender, the impact's row or the mapping says; 422 where they differ.
@@ -141,7 +141,8 @@ class ImpactTimes:
         """Refuse a missing time."""
         clock = self.layout.signals[track.name].clock or self.layout.clock
         if clock is not None and track.rate is None:
-            self.samples.require_finite([clock.column], track.rows, self.row)
+            needed = "a time with its date" if clock.dated else "a finite number"
+            self.samples.require_finite([clock.column], track.rows, self.row, needed)
 
     def pre_trigger_ms(self, tracks: list[Track], kept: list[Track], reading: Reading) -> float | None:
         """The time before the trigger: as said for this impact or by the sender, by the stamps, or by the layout."""
@@ -152,7 +153,7 @@ class ImpactTimes:
         if stated is not None:
             stated = max(0.0, round(stated - self._dropped_ms(tracks, kept), 9))
         self._require_longer(kept, stated)
-        spans = [span for track in kept if (span := track.span_ms) is not None]
+        spans = [span for track in kept if (span := track.from_zero_ms) is not None]
         if not spans or "pre_trigger_ms" in self.plan.required or self.mapping.zero == "record_start":
             return stated
         before = before_zero_ms(spans)

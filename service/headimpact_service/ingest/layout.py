@@ -26,10 +26,11 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """A column of stamps; `milliseconds` are those of one unit of them."""
+    """A column of stamps; `milliseconds` are those of one unit of them. `dated` ones count from no trigger or start."""
 
     column: int
     milliseconds: float
+    dated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +114,9 @@ class Layout:
 
     @property
     def is_timed(self) -> bool:
-        """Whether every signal has stamps."""
-        return self.clock is not None or all(signal.clock is not None for signal in self.signals.values())
+        """Whether every signal has stamps that are surely its samples': dates may be the event's."""
+        clocks = [signal.clock or self.clock for signal in self.signals.values()]
+        return all(clock is not None and not clock.dated for clock in clocks)
 
     def ends_alone(self, name: SignalName) -> bool:
         """Whether a signal's rows may end before the others': it has times or a rate of its own, or others have."""
@@ -282,7 +284,9 @@ def _clocks(mapping: Mapping, headings: Headings, required: bool, *, own: bool) 
 
 
 def _clock_in(column: int, unit: str, headings: Headings) -> Clock:
-    """A column of stamps in a unit, unless the file says another beside its heading."""
+    """A column of stamps in a unit, unless the file says another beside its heading; dates have a unit of their own."""
+    if column in headings.dated:
+        return Clock(column, TIME_UNITS["us"], dated=True)
     beside = unit_spelled("time", headings.units.get(column))
     if beside not in {None, unit}:
         raise layout_problem(

@@ -37,7 +37,7 @@ Spellings = Annotated[list[Heading], Field(min_length=1, max_length=MAX_SPELLING
 
 
 class TimeColumn(Strict):
-    """A column of stamps."""
+    """A column of stamps; of those that are dates with times of day the unit is of no account."""
 
     column: Heading
     unit: Literal["s", "ms", "us", "ns"]

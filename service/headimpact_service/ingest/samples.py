@@ -42,15 +42,15 @@ class Samples:
         """Whether a signal may end before its impact does: arrays and lists of unlike lengths."""
         return self.window.columns.lengths is not None and not self.is_whole
 
-    def require_finite(self, columns: list[int], rows: Rows, first: int) -> None:
-        """Refuse rows in which a cell is not a finite number."""
+    def require_finite(self, columns: list[int], rows: Rows, first: int, needed: str = "a finite number") -> None:
+        """Refuse rows in which a cell is not a finite number, or the other thing that is needed."""
         if self.is_whole:
             return
         for column in columns:
             faulty = np.flatnonzero(~np.isfinite(self.numbers[column][rows]))
             if faulty.size:
                 raise file_fault(
-                    f"A cell of column {column + 1} is not a finite number, at sample {faulty[0]} of the impact that "
+                    f"A cell of column {column + 1} is not {needed}, at sample {faulty[0]} of the impact that "
                     f"begins in row {first + 1} below the headings.",
                     "missing-sample",
                 )

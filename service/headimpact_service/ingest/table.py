@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -38,6 +38,10 @@ class Table(Protocol):
     @property
     def units(self) -> Mapping[int, str]:
         """Units that the format states beside a heading, by column."""
+
+    @property
+    def dated(self) -> Collection[int]:
+        """Columns of dates with times of day; as numbers they are microseconds since one instant or another."""
 
     @property
     def parted(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from datetime import datetime
 from functools import cached_property
 from itertools import groupby
@@ -201,7 +202,7 @@ class TableImpact:
         rows = track.rows
         kept: Rows = slice(rows.start + dropped, rows.stop) if isinstance(rows, slice) else rows[dropped:]
         stamps = None if track.stamps is None else track.stamps[dropped:]
-        return Track(track.name, kept, track.rate, stamps, track.milliseconds)
+        return replace(track, rows=kept, stamps=stamps)
 
     def _signal(self, track: Track, base: TimeBase) -> Signal:
         layout = self.layout.signals[track.name]

@@ -31,7 +31,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     Problem
         The table as a whole cannot be read. A fault of one impact is yielded in its place instead.
     """
-    headings = Headings(table.headings, table.units)
+    headings = Headings(table.headings, table.units, table.dated)
     plan = _plan(headings, options, format_name)
     _require_sensor(plan.mapping)
     layout = lay_out(plan.mapping, headings, plan.required)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 _RFC3339 = re.compile(
     r"[0-9]{4}-[0-9]{2}-[0-9]{2}[Tt ][0-9]{2}:[0-9]{2}:[0-9]{2}(\.[0-9]{1,9})?([Zz]|[+-][0-9]{2}:[0-9]{2})?"
 )
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ZONE = re.compile(r"[A-Za-z0-9_+-]+(/[A-Za-z0-9_+-]+){0,2}")
 
 _OF_THE_HOST = frozenset({"localtime", "posixrules", "factory"})
@@ -45,6 +46,24 @@ def instant(text: str, time_zone: str | None = None) -> datetime:
         return moment.astimezone(UTC)
     except OverflowError:
         raise TimeError("A time lies between the years 1 and 9999 in UTC.", code="out-of-range") from None
+
+
+def nanoseconds(text: str) -> int | None:
+    """How long after 1970 a time is, a local one as if it were UTC; None for what is no time."""
+    found = _RFC3339.fullmatch(text)
+    seconds = None if found is None else _whole_seconds(text[:19], found[2] or "Z")
+    if found is None or seconds is None:
+        return None
+    return seconds * 10**9 + int((found[1] or "")[1:].ljust(9, "0"))
+
+
+@lru_cache(maxsize=64)
+def _whole_seconds(text: str, offset: str) -> int | None:
+    """The same to the second: stamps that follow each other share it."""
+    try:
+        return (datetime.fromisoformat(f"{text}{offset}".upper()) - _EPOCH) // timedelta(seconds=1)
+    except ValueError:
+        return None
 
 
 def known_zone(name: str) -> None:

@@ -15,13 +15,17 @@ from headimpact_service.ingest.windows import Rows
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """One signal's rows; `rate` [Hz] is stated, `stamps` are as written, in units of so many milliseconds."""
+    """One signal's rows; `rate` [Hz] is stated, `stamps` are as written, in units of so many milliseconds.
+
+    Stamps that are `dated` count from no trigger and no start.
+    """
 
     name: SignalName
     rows: Rows
     rate: float | None
     stamps: FloatArray | None
     milliseconds: float
+    dated: bool = False
 
     @property
     def span_ms(self) -> tuple[float, float] | None:
@@ -37,6 +41,11 @@ class Track:
         if self.rate is not None or self.stamps is None or span is None or not span[0] < span[1] < np.inf:
             return self.rate
         return 1000.0 * (self.stamps.size - 1) / (span[1] - span[0])
+
+    @property
+    def from_zero_ms(self) -> tuple[float, float] | None:
+        """The same from what the stamps count from; dates are infinitely far from any trigger."""
+        return (np.inf, np.inf) if self.dated else self.span_ms
 
 
 _UNSCALED = {1.0, 1000.0}

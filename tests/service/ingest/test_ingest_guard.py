@@ -290,7 +290,7 @@ def answered(*frames: wire.Frame | bytes) -> Iterator[guard.GuardedTable | guard
         theirs.close()
 
 
-TABLE = wire.Frame("table", {"name": None, "headings": ["a"], "units": {}, "parted": True, "sampled": "1"})
+TABLE = wire.Frame("table", {"name": None, "headings": ["a"], "units": {}, "dated": [], "parted": True, "sampled": "1"})
 
 
 @pytest.mark.parametrize(
@@ -324,8 +324,8 @@ def test_a_frame_that_is_not_what_was_asked_for_ends_the_reading(frame: wire.Fra
     "frame",
     [
         wire.Frame("table", {"name": None, "headings": ["a"]}),
-        wire.Frame("table", {"name": None, "headings": 7, "units": {}, "parted": True, "sampled": "1"}),
-        wire.Frame("table", {"name": None, "headings": [], "units": {"x": "g"}, "parted": True, "sampled": ""}),
+        wire.Frame("table", {"name": None, "headings": 7, "units": {}, "dated": [], "parted": True, "sampled": "1"}),
+        wire.Frame("table", {"name": None, "headings": [], "units": {"x": "g"}, "dated": [], "parted": True, "sampled": ""}),
         wire.Frame("refused", {"slug": "no-such-problem", "detail": "x"}),
         wire.Frame("refused", {}),
     ],

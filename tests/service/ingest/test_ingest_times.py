@@ -9,7 +9,7 @@ from ingest_files import body, codes, encoded
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.impact_reading import read_impact
-from headimpact_service.ingest.times import TimeError, instant
+from headimpact_service.ingest.times import TimeError, instant, nanoseconds
 
 
 @pytest.mark.parametrize(
@@ -58,6 +58,27 @@ def test_a_time_that_cannot_be_placed_is_refused(text: str, zone: str | None, co
     with pytest.raises(TimeError) as caught:
         instant(text, zone)
     assert (caught.value.code, caught.value.field) == (code, field)
+
+
+@pytest.mark.parametrize(
+    ("text", "after"),
+    [
+        ("1970-01-01T00:00:00Z", 0),
+        ("1970-01-01 00:00:01.5", 1_500_000_000),
+        ("1970-01-01t01:00:00.000000001+01:00", 1),
+        ("1969-12-31T23:59:59.999999999Z", -1),
+        ("2026-10-03T14:05:22.113000Z", 1_791_036_322_113_000_000),
+        ("0001-01-01T00:00:00+14:00", -62_135_647_200 * 10**9),
+        ("2026-02-30T00:00:00Z", None),
+        ("2026-10-03T14:05:22.Z", None),
+        ("2026-10-03", None),
+        ("1791036322", None),
+        ("2026-10-03T14:05:22.113000Z\n", None),
+        ("٢026-10-03T14:05:22Z", None),
+    ],
+)
+def test_a_time_counts_from_1970_to_the_nanosecond(text: str, after: int | None):
+    assert nanoseconds(text) == after
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,7 @@ class ArrayTable:
     """Arrays of one number of impacts; the shorter of two records ends in NaN."""
 
     parted = True
+    dated = frozenset[int]()
 
     def __init__(self, samples: Sequence[Samples], facts: Sequence[Fact], units: dict[str, str]) -> None:
         """Samples with times first, so that a signal's own times stand before it; `units` by the array's name."""

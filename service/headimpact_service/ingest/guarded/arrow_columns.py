@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from headimpact_service.ingest.cells import Words, number_text
+from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, are_dated
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
 from headimpact_service.ingest.table import Columns, FloatArray
 
@@ -45,15 +46,28 @@ class ArrowTable:
     """A table over batches of Arrow columns."""
 
     def __init__(self, schema: pa.Schema, batches: Batches) -> None:
-        """Look at the schema only."""
+        """Look at the schema, and for times that are text at the first rows."""
         self.headings = checked_headings(schema.names)
         self._types = list(schema.types)
         self._batches = batches
         self.units = {place: unit for place, field in enumerate(schema) if (unit := _unit(field)) is not None}
         self.parted = any(map(is_list_of_numbers, self._types))
+        self.dated: frozenset[int] = frozenset()
+        self._elapsed = Elapsed()
         if not self.parted:  # times that say their unit by their type; those of an impact as a whole are text
-            timed = (place for place, kind in enumerate(self._types) if is_time(kind))
-            self.units = dict.fromkeys(timed, MICROSECONDS) | self.units
+            durations = (place for place, kind in enumerate(self._types) if pa.types.is_duration(kind))
+            self.units = dict.fromkeys(durations, MICROSECONDS) | self.units
+            self.dated = frozenset({*self._places(pa.types.is_timestamp), *self._written_times()})
+
+    def _places(self, is_kind: Callable[[pa.DataType], bool]) -> list[int]:
+        return [place for place, kind in enumerate(self._types) if is_kind(kind)]
+
+    def _written_times(self) -> Iterator[int]:
+        """Columns of times that are text, by their first rows."""
+        texts = self._places(is_text)
+        batch = next((batch for batch in self._batches(texts) if batch.num_rows), None) if texts else None
+        if batch is not None:
+            yield from (place for place, column in zip(texts, batch.columns, strict=True) if _is_dated(column))
 
     def has_samples(self, place: int) -> bool:
         """Where rows are impacts, lists of numbers do; where they are samples, numbers and times."""
@@ -70,18 +84,33 @@ class ArrowTable:
             if self.parted:
                 yield from _impacts(columns, numbers, texts)
             elif batch.num_rows:
-                cells = {place: floats(columns[place]) for place in numbers}
+                cells = {place: self._numbers(columns[place]) for place in numbers}
                 yield Columns(batch.num_rows, cells, {place: words(columns[place]) for place in texts})
+
+    def _numbers(self, column: pa.Array) -> FloatArray:
+        if not is_text(column.type):
+            return floats(column)
+        return np.array([self._elapsed.microseconds(cell or "") for cell in column.to_pylist()])
 
     def _require_numbers(self, place: int) -> None:
         kind = self._types[place]
-        if not (is_number(kind) or is_list_of_numbers(kind) or (is_time(kind) and not self.parted)):
+        is_duration = pa.types.is_duration(kind) and not self.parted
+        if not (is_number(kind) or is_list_of_numbers(kind) or is_duration or place in self.dated):
             raise unreadable(f"Column {place + 1} holds no numbers.")
 
 
-def is_time(kind: pa.DataType) -> bool:
-    """Whether cells of this type are instants or durations."""
-    return bool(pa.types.is_timestamp(kind) or pa.types.is_duration(kind))
+def is_text(kind: pa.DataType) -> bool:
+    """Whether cells of this type are text."""
+    plain = kind.value_type if pa.types.is_dictionary(kind) else kind
+    return bool(pa.types.is_string(plain) or pa.types.is_large_string(plain))
+
+
+def _is_dated(column: pa.Array) -> bool:
+    """Whether a column of text begins with times; one that is not even text does not."""
+    try:
+        return are_dated(cell or "" for cell in column.slice(0, FIRST_ROWS).to_pylist())
+    except UnicodeDecodeError:
+        return False
 
 
 def floats(column: pa.Array) -> FloatArray:

@@ -26,6 +26,7 @@ class StructTable:
     """A struct array: each element is an impact, each field a column of samples, three of them, or a fact."""
 
     parted = True
+    dated = frozenset[int]()
     units: dict[int, str] = {}  # noqa: RUF012 - a MATLAB file says none
 
     def __init__(self, impacts: Sequence[dict[str, Any]]) -> None:

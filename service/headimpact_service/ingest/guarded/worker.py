@@ -112,9 +112,15 @@ def _offer(connection: socket.socket, content: NamedTable) -> bool:
     """Show a table's headings, then send the columns that are wanted; False where no more is wanted."""
     table = content.table
     units = {str(column): unit for column, unit in table.units.items()}
-    shown = {"name": content.name, "headings": table.headings, "units": units, "parted": table.parted}
-    sampled = "".join("1" if table.has_samples(place) else "0" for place in range(len(table.headings)))
-    send(connection, Frame("table", shown | {"sampled": sampled}))
+    shown = {
+        "name": content.name,
+        "headings": table.headings,
+        "units": units,
+        "dated": list(table.dated),
+        "parted": table.parted,
+        "sampled": "".join("1" if table.has_samples(place) else "0" for place in range(len(table.headings))),
+    }
+    send(connection, Frame("table", shown))
     wanted = receive(connection, Deadline(None))
     if wanted.kind != "read":
         return wanted.kind == "skip"

@@ -18,6 +18,7 @@ import numpy as np
 from python_calamine import CalamineSheet, CalamineWorkbook, SheetTypeEnum
 
 from headimpact_service.ingest.cells import is_no_number, number_text, said
+from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
 from headimpact_service.ingest.guarded.contents import (
     Content,
     NamedTable,
@@ -92,10 +93,10 @@ class _Block:
     units: list[str]
     rows: list[Row] = field(default_factory=list)
 
-    def cells(self, place: int) -> list[Any]:
-        """One column, empty where a row is too short for it."""
+    def cells(self, place: int, first: int | None = None) -> list[Any]:
+        """One column or its first cells, empty where a row is too short for it."""
         column = self.columns[place]
-        return [row[column] if column < len(row) else "" for row in self.rows]
+        return [row[column] if column < len(row) else "" for row in self.rows[:first]]
 
 
 class SheetTable:
@@ -109,6 +110,8 @@ class SheetTable:
         self.units = dict(enumerate(checked_headings(unit for block in blocks for unit in block.units)))
         self._places = [(block, place) for block in blocks for place in range(len(block.columns))]
         self._rows = max(len(block.rows) for block in blocks)
+        self.dated = dated_columns(list(map(_time, block.cells(place, FIRST_ROWS))) for block, place in self._places)
+        self._elapsed = Elapsed()
 
     def has_samples(self, place: int) -> bool:  # noqa: ARG002 - the shape of a table
         """Any column may."""
@@ -129,8 +132,12 @@ class SheetTable:
     def _numbers(self, place: int) -> FloatArray:
         block, column = self._places[place]
         values = np.full(self._rows, np.nan)
-        values[: len(block.rows)] = [_number(cell) for cell in block.cells(column)]
+        read = self._microseconds if place in self.dated else _number
+        values[: len(block.rows)] = [read(cell) for cell in block.cells(column)]
         return values
+
+    def _microseconds(self, cell: Any) -> float:  # noqa: ANN401 - any cell
+        return self._elapsed.microseconds(_text(cell))
 
     def _texts(self, place: int) -> list[str]:
         block, column = self._places[place]
@@ -172,6 +179,11 @@ def _begun(above: Row, before: Row) -> _Block | None:
 
 def _word(cell: Any) -> str:  # noqa: ANN401 - any cell
     return cell if isinstance(cell, str) else ""
+
+
+def _time(cell: Any) -> str:  # noqa: ANN401 - any cell
+    """A cell that may be a time, as text."""
+    return cell.isoformat() if isinstance(cell, dt.datetime) else _word(cell)
 
 
 def _holds_nothing(row: Row) -> bool:
