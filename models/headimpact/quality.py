@@ -41,6 +41,7 @@ CODES: tuple[str, ...] = (
     "channel_missing",
     "questionable_data",
     "sample_count_mismatch",
+    "time_origin_mismatch",
     "not_worn",
     "outside_model_population",
     "duplicate_content",

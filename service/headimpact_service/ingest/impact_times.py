@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from functools import cached_property
 
 import numpy as np
 
+from headimpact.quality import QualityNote
 from headimpact.recording import SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import number_said
@@ -15,7 +17,7 @@ from headimpact_service.ingest.layout import Clock, SignalLayout
 from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows, rounded_to
+from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows, go_on_alike, rounded_to
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import Track
 from headimpact_service.ingest.windows import Rows, numbers_of
@@ -37,7 +39,7 @@ class ImpactTimes:
     def track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
         """A signal's rows with the rate or the stamps that count for them."""
         signal = self.layout.signals[name]
-        clock = signal.clock or self.layout.clock
+        clock = signal.clock or self.clock
         if self.layout.ends_alone(name) or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
         rate = self._said_rate(signal, reading)
@@ -100,18 +102,37 @@ class ImpactTimes:
                 "sample-order",
             )
 
-    def require_one_time(self) -> None:
-        """Refuse two columns of times that say different things."""
-        clock = self.layout.clock
-        for other in self.layout.other_clocks:
-            assert clock is not None
-            one, two = (self.samples.numbers[found.column][self.rows] * found.milliseconds for found in (clock, other))
+    @cached_property
+    def clock(self) -> Clock | None:
+        """The column of times that the signals share: of several one that counts from the trigger, else the first."""
+        first = self.layout.clock
+        return next(filter(self._has_trigger, self.layout.clocks), first) if self.layout.other_clocks else first
+
+    def other_origins(self) -> Iterator[QualityNote]:
+        """A note on columns of times that go on alike from another origin; 422 where they contradict each other.
+
+        Times from the record's start, or from any other instant, say nothing against those from the trigger.
+        """
+        for other in self.layout.clocks:
+            if self.clock is None or other is self.clock:
+                continue
+            one, two = self._times_ms(self.clock), self._times_ms(other)
             if not agree(one, two):
-                raise file_fault(
-                    f"Columns {clock.column + 1} and {other.column + 1} both give the times and do not agree: say in a "
-                    "mapping which to take.",
-                    "times-differ",
-                )
+                columns = f"Columns {self.clock.column + 1} and {other.column + 1}"
+                if not go_on_alike(one, two):
+                    raise _contradiction(f"{columns} both give the times and do not agree")
+                apart = f"{columns} go on alike from {_origin(self.clock, one)} and from {_origin(other, two)}"
+                if self.mapping.zero == "trigger" or self._has_trigger(other):
+                    raise _contradiction(f"{apart}, so that the trigger is not clear")
+                yield QualityNote("time_origin_mismatch", "note", f"{apart}: column {self.clock.column + 1} was read.")
+
+    def _times_ms(self, clock: Clock) -> FloatArray:
+        return self.samples.numbers[clock.column][self.rows] * clock.milliseconds
+
+    def _has_trigger(self, clock: Clock) -> bool:
+        """Whether a column of times goes from below zero to zero or above."""
+        there = _there(self._times_ms(clock))
+        return not clock.dated and there.size > 0 and before_zero_ms([(there[0], there[-1])]) is not None
 
     def require_no_other(self, tracks: list[Track], labels: RowLabels) -> None:
         """Refuse times and rates beside those that are read at which no signal is: one signal's may be among them."""
@@ -122,7 +143,7 @@ class ImpactTimes:
                 raise _other(rate_column.heading, said)
         for other in self.layout.others.clocks:
             self._require_among(other.column, other.milliseconds, other.heading, rates)
-        shared = self.layout.clock
+        shared = self.clock
         if shared is not None and all(signal.is_apart for signal in self.layout.signals.values()):
             self._require_among(shared.column, shared.milliseconds, "of the shared times", rates)
 
@@ -139,7 +160,7 @@ class ImpactTimes:
 
     def require_times(self, track: Track) -> None:
         """Refuse a missing time."""
-        clock = self.layout.signals[track.name].clock or self.layout.clock
+        clock = self.layout.signals[track.name].clock or self.clock
         if clock is not None and track.rate is None:
             needed = "a time with its date" if clock.dated else "a finite number"
             self.samples.require_finite([clock.column], track.rows, self.row, needed)
@@ -198,6 +219,19 @@ def _other(heading: str, rate: float) -> Problem:
     )
 
 
+def _there(stamps: FloatArray) -> FloatArray:
+    return stamps[np.isfinite(stamps)]
+
+
+def _origin(clock: Clock, times_ms: FloatArray) -> str:
+    """Where a column of times begins, for people."""
+    return "a date" if clock.dated else f"{_there(times_ms)[0]:g} ms"
+
+
+def _contradiction(what: str) -> Problem:
+    return file_fault(f"{what}: say in a mapping which to take.", "times-differ")
+
+
 def _require_one_rate(said: Iterable[float | None]) -> None:
     """Refuse rates of one signal that differ by more than what clocks drift."""
     given = [rate for rate in said if rate is not None]
@@ -212,7 +246,7 @@ def _require_one_rate(said: Iterable[float | None]) -> None:
 
 def _require_on_time(stamps_ms: FloatArray, rate: float) -> None:
     """Refuse times that are not those of a rate."""
-    if not follows(stamps_ms[np.isfinite(stamps_ms)], rate):
+    if not follows(_there(stamps_ms), rate):
         raise file_fault(
             f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew or "
             "are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a mapping).",

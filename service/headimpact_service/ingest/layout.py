@@ -83,6 +83,11 @@ class Layout:
     """What may tell that the rows are several impacts, where nothing that is read would."""
 
     @property
+    def clocks(self) -> list[Clock]:
+        """All columns of times that the signals share."""
+        return [] if self.clock is None else [self.clock, *self.other_clocks]
+
+    @property
     def labels(self) -> list[int]:
         """Columns of what is true of an impact as a whole, those that tell impacts apart among them.
 
@@ -96,7 +101,7 @@ class Layout:
     def numbers(self) -> list[int]:
         """Columns that are read as numbers."""
         signals = self.signals.values()
-        all_clocks = (self.clock, *self.other_clocks, *(signal.clock for signal in signals))
+        all_clocks = (*self.clocks, *(signal.clock for signal in signals))
         clocks = [clock.column for clock in all_clocks if clock is not None]
         resultants = [signal.resultant for signal in signals if signal.resultant is not None]
         counted = [] if self.sample_number is None else [self.sample_number]

@@ -89,6 +89,13 @@ def agree(first_ms: FloatArray, second_ms: FloatArray) -> bool:
     return bool((np.abs(one - two) <= NEAR * step + max(rounded_to(one), rounded_to(two))).all())
 
 
+def go_on_alike(first_ms: FloatArray, second_ms: FloatArray) -> bool:
+    """Whether two columns of stamps [ms] have the same steps, whatever they count from."""
+    there = np.isfinite(first_ms) & np.isfinite(second_ms)
+    one, two = first_ms[there], second_ms[there]
+    return agree(one - one[:1], two - two[:1])
+
+
 def rounded_to(stamps_ms: FloatArray) -> float:
     """What all stamps are multiples of, of what they may be written to; zero for anything finer."""
     return next((grid for grid in ROUNDED_TO_MS if _are_multiples(stamps_ms, grid)), 0.0)

@@ -103,7 +103,7 @@ class TableImpact:
         mapping, options, reading = self.mapping, self.options, self.reading
         fill_gaps = options.fill_gaps or reading.fill_gaps or bool(mapping.fill_gaps)
         self.times.require_counted(allow_gaps=fill_gaps)
-        self.times.require_one_time()
+        self.notes += self.times.other_origins()
         tracks = self._tracks()
         self.times.require_no_other(tracks, self.labels)
         # The signals before the drop say when the record began, those after it when what is kept begins.

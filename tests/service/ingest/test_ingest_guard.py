@@ -325,7 +325,9 @@ def test_a_frame_that_is_not_what_was_asked_for_ends_the_reading(frame: wire.Fra
     [
         wire.Frame("table", {"name": None, "headings": ["a"]}),
         wire.Frame("table", {"name": None, "headings": 7, "units": {}, "dated": [], "parted": True, "sampled": "1"}),
-        wire.Frame("table", {"name": None, "headings": [], "units": {"x": "g"}, "dated": [], "parted": True, "sampled": ""}),
+        wire.Frame(
+            "table", {"name": None, "headings": [], "units": {"x": "g"}, "dated": [], "parted": True, "sampled": ""}
+        ),
         wire.Frame("refused", {"slug": "no-such-problem", "detail": "x"}),
         wire.Frame("refused", {}),
     ],

@@ -159,11 +159,16 @@ def test_degrees_may_be_written_with_exponents(unit):
     assert one(csv_text(heading=GENERIC.replace("_rad_s", f" [{unit}]"))).recording.angular_velocity.unit == "deg/s"
 
 
-def twice_timed(other_ms: Callable[[int], float], heading: str = "time_s", first: str = "time_ms") -> str:
+def twice_timed(
+    other_ms: Callable[[int], float],
+    heading: str = "time_s",
+    first: str = "time_ms",
+    of_ms: Callable[[int], float] = lambda n: n - 10,
+) -> str:
     """The usual table with two columns of times."""
     _, *lines = csv_text().splitlines()
     columns = GENERIC.partition(",")[2]
-    rows = [f"{n - 10},{other_ms(n) / 1000:.6f},{line.partition(',')[2]}" for n, line in enumerate(lines)]
+    rows = [f"{of_ms(n)},{other_ms(n) / 1000:.6f},{line.partition(',')[2]}" for n, line in enumerate(lines)]
     return "\n".join([f"{first},{heading},{columns}", *rows])
 
 
@@ -180,6 +185,35 @@ def test_two_columns_of_times_that_do_not_agree_are_refused(other):
     assert "Columns 1 and 2" in problem.detail
     chosen = Mapping.model_validate({"time": {"column": "time_ms", "unit": "ms"}})
     assert one(twice_timed(other), mapping=chosen).recording.pre_trigger_ms == 10.0
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "read", "before"),
+    [
+        (lambda n: n - 10, lambda n: n, 1, 10.0),
+        (lambda n: n, lambda n: n - 10, 2, 10.0),
+        (lambda n: n - 10, lambda n: n + 3_600_000, 1, 10.0),
+        (lambda n: n, lambda n: n + 5, 1, None),
+        (lambda n: n - 50, lambda n: n, 1, None),
+    ],
+)
+def test_of_times_from_two_origins_those_from_the_trigger_are_read(first, second, read, before):
+    record = one(twice_timed(second, of_ms=first))
+    assert (record.recording.pre_trigger_ms, record.recording.linear_acceleration.sample_rate_hz) == (before, 1000.0)
+    (note,) = record.notes
+    assert (note.code, note.severity) == ("time_origin_mismatch", "note")
+    assert f"{first(0):g} ms" in note.detail
+    assert f"{second(0):g} ms" in note.detail
+    assert note.detail.endswith(f"column {read} was read.")
+
+
+def test_origins_that_leave_the_trigger_unclear_are_both_named():
+    problem = refused(twice_timed(lambda n: n - 20))
+    assert "from -10 ms and from -20 ms, so that the trigger is not clear: say in a mapping" in problem.detail
+    zero = Mapping.model_validate({"zero": "trigger"})
+    assert codes(refused(twice_timed(lambda n: n), mapping=zero)) == [(None, "times-differ")]
+    beside = Mapping.model_validate({"pre_trigger_ms": 7.5})
+    assert one(twice_timed(lambda n: n), mapping=beside).recording.pre_trigger_ms == 7.5
 
 
 def test_an_event_s_stamps_beside_the_samples_times_are_no_second_clock():

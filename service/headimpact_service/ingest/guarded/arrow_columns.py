@@ -71,8 +71,7 @@ class ArrowTable:
 
     def has_samples(self, place: int) -> bool:
         """Where rows are impacts, lists of numbers do; where they are samples, numbers and times."""
-        kind = self._types[place]
-        return is_list_of_numbers(kind) if self.parted else is_number(kind) or is_time(kind)
+        return is_list_of_numbers(self._types[place]) if self.parted else self._holds_numbers(place)
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns; those of lists end to end, with the length of each impact."""
@@ -93,10 +92,13 @@ class ArrowTable:
         return np.array([self._elapsed.microseconds(cell or "") for cell in column.to_pylist()])
 
     def _require_numbers(self, place: int) -> None:
+        if not self._holds_numbers(place):
+            raise unreadable(f"Column {place + 1} holds no numbers.")
+
+    def _holds_numbers(self, place: int) -> bool:
         kind = self._types[place]
         is_duration = pa.types.is_duration(kind) and not self.parted
-        if not (is_number(kind) or is_list_of_numbers(kind) or is_duration or place in self.dated):
-            raise unreadable(f"Column {place + 1} holds no numbers.")
+        return is_number(kind) or is_list_of_numbers(kind) or is_duration or place in self.dated
 
 
 def is_text(kind: pa.DataType) -> bool:
