@@ -20,13 +20,14 @@ from headimpact_service import deps
 from headimpact_service.answers import JSON, preferred
 from headimpact_service.bodies import read_json
 from headimpact_service.deps import Caller
-from headimpact_service.errors import Problem
+from headimpact_service.errors import Problem, not_found
 from headimpact_service.intake.scoring import Terms
 from headimpact_service.parameters import NoQuery, Query, parse_query
 from headimpact_service.store.keys import KeyRow
 
 PUBLIC = ""
 """Access of an operation that needs no key."""
+NUL = "\x00"
 ANY_KEY = deps.ANY
 """Access of an operation that any valid key may use."""
 
@@ -87,7 +88,14 @@ class Call:
         return replace(self, caller=await deps.renewed(self.request))
 
     def path(self, name: str) -> str:
-        """A part of the path."""
+        """A part of the path that names something; 404 for what no text of the database can be."""
+        text = self.given(name)
+        if NUL in text:
+            raise not_found("address")
+        return text
+
+    def given(self, name: str) -> str:
+        """A part of the path as it was sent, which its operation holds to rules of its own."""
         return str(self.request.path_params[name])
 
 

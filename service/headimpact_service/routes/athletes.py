@@ -76,10 +76,7 @@ class AthleteList(BaseModel):
 class AthleteQuery(SyncQuery):
     """Which athletes."""
 
-    external_id: Annotated[
-        str | None,
-        Field(min_length=1, max_length=200, description="Your id of one, also one that was merged into another."),
-    ] = None
+    external_id: Name | None = Field(None, description="Your id of one, also one that was merged into another.")
 
 
 ETAG = {"ETag": "The revision, for If-Match."}

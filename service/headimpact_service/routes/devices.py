@@ -164,7 +164,7 @@ async def read_device(call: Call) -> Response:
 def _serial(call: Call) -> str:
     """The serial in the path, held to the same rules as in an impact."""
     try:
-        return _SERIAL.validate_python(call.path("serial"))
+        return _SERIAL.validate_python(call.given("serial"))
     except ValidationError:
         raise invalid_parameter(
             "serial", "Must have 1 to 200 characters without control characters.", "serial"

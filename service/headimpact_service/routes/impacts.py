@@ -15,7 +15,7 @@ from headimpact_service import deps, examples
 from headimpact_service.answers import JSON, answer, json_bytes, no_content
 from headimpact_service.errors import invalid_parameter, not_found
 from headimpact_service.ingest.digest import content_digest
-from headimpact_service.ingest.impact_json import CriterionKey, ImpactBody
+from headimpact_service.ingest.impact_json import CriterionKey, ImpactBody, Name
 from headimpact_service.ingest.impact_reading import to_record
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.intake.exporting import CONTEXT_FLAGS
@@ -47,7 +47,6 @@ TRIES = 20
 """How often an impact is scored before it is answered that what it depends on keeps changing."""
 ETAG = {"ETag": "The revision, for If-Match."}
 LOCATION = {"Location": "The impact's address."}
-Text = Annotated[str | None, Field(min_length=1, max_length=200)]
 
 
 @routes(
@@ -118,10 +117,10 @@ QualityCode = Annotated[str, AfterValidator(_known_code), WithJsonSchema({"type"
 class ImpactQuery(SyncQuery):
     """Which impacts."""
 
-    athlete_id: Text = Field(None, description="Of this athlete.")
-    external_id: Text = Field(None, description="The one that you call this.")
-    device_serial: Text = Field(None, description="From this device.")
-    session_id: Text = Field(None, description="Of this session.")
+    athlete_id: Name | None = Field(None, description="Of this athlete.")
+    external_id: Name | None = Field(None, description="The one that you call this.")
+    device_serial: Name | None = Field(None, description="From this device.")
+    session_id: Name | None = Field(None, description="Of this session.")
     occurred_from: Annotated[Instant | None, Field(description="At this time or later.")] = None
     occurred_to: Annotated[Instant | None, Field(description="Before this time.")] = None
     quality: QualityCode | None = Field(None, description="With this quality note.")

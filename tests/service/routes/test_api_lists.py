@@ -69,6 +69,37 @@ class TestPages:
         assert api.get("/v1/me?x=1").status_code == 422
 
 
+class TestNul:
+    """PostgreSQL keeps no text with NUL, so none can name anything."""
+
+    @pytest.mark.parametrize(
+        ("path", "parameter"),
+        [
+            ("/v1/impacts", "session_id"),
+            ("/v1/impacts", "device_serial"),
+            ("/v1/impacts", "external_id"),
+            ("/v1/impacts", "athlete_id"),
+            ("/v1/athletes", "external_id"),
+        ],
+    )
+    def test_a_filter_with_nul_is_422_and_named(self, api: Api, path: str, parameter: str) -> None:
+        for text in ("%00", "a%00b"):
+            answer = api.get(f"{path}?{parameter}={text}")
+            assert (answer.status_code, answer.json()["errors"][0]["parameter"]) == (422, parameter)
+
+    @pytest.mark.parametrize("name", ["%00", "a%00"])
+    @pytest.mark.parametrize(
+        "path",
+        ["devices/{}", "models/{}", "models/{}/report", "models/{}/risk-map", "schedules/{}", "models/aliases/{}"],
+    )
+    def test_a_name_with_nul_is_nobody_s(self, api: Api, path: str, name: str) -> None:
+        assert api.get(f"/v1/{path.format(name)}").status_code == 404
+
+    def test_nothing_is_done_under_a_name_with_nul(self, api: Api) -> None:
+        assert api.delete("/v1/schedules/a%00").status_code == 404
+        assert api.post("/v1/models/a%00/scores", json={}).status_code == 404
+
+
 class TestSync:
     def test_updated_since_lists_changes_in_their_order_with_tombstones(self, api: Api) -> None:
         first, second, third = (api.create(f"e-{i}") for i in range(3))
