@@ -161,6 +161,13 @@ def patch(
         return present
     if changed.external_id != present.external_id:
         _require_free(conn, data_set_id, changed.external_id)
+    return _changed(conn, data_set_id, present, changed)
+
+
+def _changed(conn: Connection, data_set_id: bytes, present: Athlete, changed: Athlete) -> Athlete:
+    """Keep other fields of an athlete; impacts show some of them, so these change with them."""
+    if (changed.external_id, changed.consent) != (present.external_id, present.consent):
+        _move_impacts(conn, data_set_id, present.id, present.id)
     now = next_change(conn, athletes, data_set_id)
     return _update(conn, replace(changed, revision=present.revision + 1, updated_at=now))
 
@@ -203,14 +210,18 @@ def merge(
     merged = replace(target, **_completed(target, source))
     if merged == target:
         return target
-    now = next_change(conn, athletes, data_set_id)
-    return _update(conn, replace(merged, revision=target.revision + 1, updated_at=now))
+    return _changed(conn, data_set_id, target, merged)
 
 
 def _move_all(conn: Connection, data_set_id: bytes, source: bytes, target: bytes) -> None:
-    moved = conn.execute(_IMPACTS_OF, {"data_set_id": data_set_id, "athlete_id": source}).scalars().all()
     for statement in _MOVE:
         conn.execute(statement, {"of_data_set": data_set_id, "source": source, "target": target})
+    _move_impacts(conn, data_set_id, source, target)
+
+
+def _move_impacts(conn: Connection, data_set_id: bytes, source: bytes, target: bytes) -> None:
+    """Make an athlete's impacts another's, or touch them if both are one: who follows the list sees them again."""
+    moved = conn.execute(_IMPACTS_OF, {"data_set_id": data_set_id, "athlete_id": source}).scalars().all()
     first = next_change(conn, impacts, data_set_id)
     rows = [
         {"of_data_set": data_set_id, "impact": impact, "target": target, "updated_at": first + number * MICROSECOND}

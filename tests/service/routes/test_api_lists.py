@@ -110,6 +110,20 @@ class TestSync:
         assert rows[2]["deleted_at"] == rows[2]["updated_at"]
         assert "score" not in rows[2]
 
+    @pytest.mark.parametrize(
+        ("change", "listed"), [({"external_id": "p-99"}, True), ({"consent": "granted"}, True), ({"sport": "x"}, False)]
+    )
+    def test_an_athlete_s_change_that_impacts_show_lists_them_again(
+        self, api: Api, change: dict[str, str], listed: bool
+    ) -> None:
+        made = [api.create(f"e-{i}", athlete={"external_id": "p-17"}) for i in range(2)]
+        since = {"updated_since": api.get(f"/v1/impacts/{made[1]['id']}").json()["updated_at"]}
+        assert api.patch(f"/v1/athletes/{made[0]['athlete']['id']}", json=change).status_code == 200
+        rows = api.get("/v1/impacts", params=since).json()["data"]
+        assert [row["id"] for row in rows] == [row["id"] for row in (made if listed else made[1:])]
+        assert {row["athlete"]["external_id"] for row in rows} == {change.get("external_id", "p-17")}
+        assert {row["revision"] for row in rows} == {1}
+
     def test_who_follows_the_pages_of_changes_sees_what_changes_meanwhile(self, api: Api) -> None:
         made = [api.create(f"e-{i}") for i in range(3)]
         start = {"updated_since": made[0]["updated_at"], "limit": 2}
