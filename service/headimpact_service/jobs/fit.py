@@ -7,11 +7,14 @@ from functools import partial
 from typing import Any
 
 from headimpact_service.errors import Problem
+from headimpact_service.intake import registry
 from headimpact_service.intake.cohorts import select
 from headimpact_service.jobs.runs import House, Outcome, Result, Work
-from headimpact_service.store import aliases, ids, models, schedules
+from headimpact_service.store import aliases, ids, models, organisation_settings, schedules
 from headimpact_service.store.jobs import Job
 from headimpact_service.store.models import NewModel
+
+_NO_MODEL: Outcome = {"version": None, "skipped": None, "promoted": False, "not_promoted": None, "gates": None}
 
 
 class Fit:
@@ -34,7 +37,7 @@ class Fit:
 
     def result(self, outcomes: Sequence[Outcome]) -> Result:
         """The version, or why there is none."""
-        return Result(outcomes[0] if outcomes else {"version": None, "skipped": None, "promoted": False, "gates": None})
+        return Result(outcomes[0] if outcomes else _NO_MODEL)
 
     def clean(self, job: Job, house: House) -> None:
         """Nothing is kept outside the database."""
@@ -56,11 +59,13 @@ def _version(job: Job) -> str:
 
 def _skip(job: Job, skipped: Any, conn: Any) -> Outcome:  # noqa: ANN401 - of the child; a connection of the store
     _note(conn, job, skipped.digest)
-    return {"version": None, "skipped": skipped.reason, "promoted": False, "gates": None}
+    return {**_NO_MODEL, "skipped": skipped.reason}
 
 
 def _register(job: Job, fitted: Any, conn: Any) -> Outcome:  # noqa: ANN401 - a connection of the store
-    """Register the version, unless the cohort has lost an impact since it was read."""
+    """Register the version, unless the cohort has lost an impact since it was read, or another job has learnt it."""
+    if schedules.last_seen(conn, job.data_set_id, job.arguments.get("schedule")) == fitted.digest:
+        return {**_NO_MODEL, "skipped": schedules.NOTHING_NEW}
     _require_whole(conn, job, fitted.lines)
     version = fitted.document["version"]
     new = NewModel(
@@ -77,12 +82,33 @@ def _register(job: Job, fitted: Any, conn: Any) -> Outcome:  # noqa: ANN401 - a 
     name = ids.encode("job", job.id)
     aliases.put(conn, job.data_set_id, "candidate", version, f"Fitted by {name}.", job.key_id)
     gates = fitted.report["gates"]
-    promoted = bool(job.arguments.get("promote") and gates) and all(gate["passed"] for gate in gates)
-    if promoted:
+    passed = bool(job.arguments.get("promote") and gates) and all(gate["passed"] for gate in gates)
+    held = _what_holds(conn, job, version, fitted.active) if passed else None
+    if passed and held is None:
         reason = f"Passed all gates of the schedule {job.arguments.get('schedule')} ({name})."
         aliases.put(conn, job.data_set_id, "active", version, reason, job.key_id)
     _note(conn, job, fitted.digest)
-    return {"version": version, "skipped": None, "promoted": promoted, "gates": gates}
+    return {
+        "version": version,
+        "skipped": None,
+        "promoted": passed and held is None,
+        "not_promoted": held,
+        "gates": gates,
+    }
+
+
+def _what_holds(conn: Any, job: Job, version: str, judged_against: str) -> str | None:  # noqa: ANN401 - of the store
+    """Why a model that passed its gates is not promoted all the same: what a person did meanwhile goes before."""
+    active = registry.active_model(conn, job.data_set_id).version
+    if active != judged_against:
+        return f"It was judged against {judged_against}, but {active} is active now: promote it by hand, or fit again."
+    settings = organisation_settings.of_data_set(conn, job.data_set_id)
+    try:
+        model = registry.model_of(conn, job.data_set_id, version)
+        registry.require_promotable(model, settings.incidence, settings.operating_points)
+    except Problem as problem:
+        return problem.detail
+    return None
 
 
 def _note(conn: Any, job: Job, digest: str | None) -> None:  # noqa: ANN401 - a connection of the store

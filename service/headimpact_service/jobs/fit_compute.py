@@ -16,6 +16,7 @@ from headimpact_service.intake.cohorts import Selected, cohort_of, options_of, s
 from headimpact_service.intake.drift import drift_document
 from headimpact_service.intake.gates import judge
 from headimpact_service.reports.page import refit_page
+from headimpact_service.store import schedules
 from headimpact_service.store.database import Database
 
 
@@ -28,6 +29,8 @@ class Fitted:
     page: str
     lines: list[str]
     digest: str
+    active: str
+    """The version that it was judged against."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,21 +48,22 @@ def compute(arguments: dict[str, Any]) -> Iterator[Fitted | Skipped]:
         with database.read() as conn:
             selected = select(conn, arguments["data_set_id"], arguments["fit"].get("cohort") or {})
             active = registry.active_model(conn, arguments["data_set_id"])
+            seen = schedules.last_seen(conn, arguments["data_set_id"], arguments.get("schedule"))
     finally:
         database.close()
     try:
-        yield _fitted(arguments, selected, active)
+        yield _fitted(arguments, selected, active, seen)
     except CalibrationError as error:
         if arguments.get("schedule") is None:
             raise Problem("cohort-unfit", str(error), extra={"excluded": dict(selected.excluded)}) from None
         yield Skipped(str(error))
 
 
-def _fitted(arguments: Mapping[str, Any], selected: Selected, active: RiskModel) -> Fitted | Skipped:
+def _fitted(arguments: Mapping[str, Any], selected: Selected, active: RiskModel, seen: str | None) -> Fitted | Skipped:
     fit = arguments["fit"]
     cohort = cohort_of(selected)
-    if arguments.get("last_digest") == cohort.digest:
-        return Skipped("No impact was labelled, corrected or withdrawn since the last fit.", cohort.digest)
+    if seen == cohort.digest:
+        return Skipped(schedules.NOTHING_NEW, cohort.digest)
     found = refit(cohort, options_of(fit), active)
     model = fitted_model(found, arguments["version"], fit.get("title") or "")
     report = report_document(found) | {
@@ -74,7 +78,7 @@ def _fitted(arguments: Mapping[str, Any], selected: Selected, active: RiskModel)
         "gates": _gates(arguments, found, model, active),
     }
     page = refit_page(found, report, model, active)
-    return Fitted(model_to_document(model), report, page, selected.lines, cohort.digest)
+    return Fitted(model_to_document(model), report, page, selected.lines, cohort.digest, active.version)
 
 
 def _gates(

@@ -9,7 +9,7 @@ from sqlalchemy import Connection, bindparam, select, update
 
 from headimpact_service.errors import not_found
 from headimpact_service.store.revision import require_revision
-from headimpact_service.store.tables import organisations
+from headimpact_service.store.tables import data_sets, organisations
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,8 @@ _GET = select(organisations.c.incidence, organisations.c.operating_points, organ
     organisations.c.id == bindparam("organisation_id")
 )
 
+_OWNER = select(data_sets.c.organisation_id).where(data_sets.c.id == bindparam("data_set_id"))
+
 
 def get(conn: Connection, organisation_id: bytes) -> OrganisationSettings:
     """The settings of an organisation."""
@@ -32,6 +34,12 @@ def get(conn: Connection, organisation_id: bytes) -> OrganisationSettings:
     if row is None:
         raise not_found("organisation")
     return OrganisationSettings(row.incidence, tuple(row.operating_points), row.settings_revision)
+
+
+def of_data_set(conn: Connection, data_set_id: bytes) -> OrganisationSettings:
+    """The settings of the organisation whose data set it is."""
+    organisation = conn.execute(_OWNER, {"data_set_id": data_set_id}).scalar_one()
+    return get(conn, organisation)
 
 
 def put(

@@ -113,6 +113,16 @@ def remove(conn: Connection, data_set_id: bytes, name: str, *, if_match: int | N
     conn.execute(delete(schedules).where(schedules.c.data_set_id == data_set_id, schedules.c.name == name))
 
 
+NOTHING_NEW = "No impact was labelled, corrected or withdrawn since the last fit."
+"""Why a schedule skips a cohort that it has seen."""
+
+
+def last_seen(conn: Connection, data_set_id: bytes, name: str | None) -> str | None:
+    """The digest of the cohort that a schedule has seen last; none of no schedule."""
+    found = None if name is None else get(conn, data_set_id, name)
+    return None if found is None else found.last_digest
+
+
 def note_fit(conn: Connection, data_set_id: bytes, name: str, digest: str) -> None:
     """Remember which cohort the schedule has seen last."""
     conn.execute(_UPDATE, {"of_data_set": data_set_id, "of_name": name, "last_digest": digest})
@@ -153,7 +163,6 @@ def _job(schedule: Schedule) -> NewJob:
             "gates": dict(schedule.gates),
             "promote": schedule.promote,
             "schedule": schedule.name,
-            "last_digest": schedule.last_digest,
         },
         key_id=schedule.key_id,
     )

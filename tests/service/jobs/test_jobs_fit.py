@@ -24,7 +24,7 @@ from headimpact_service.cli.cohort_table import read_cohort
 from headimpact_service.deps import SCOPES
 from headimpact_service.intake.cron import next_due
 from headimpact_service.intake.scoring import Terms
-from headimpact_service.jobs import runs
+from headimpact_service.jobs import fit_compute, runs
 from headimpact_service.jobs.engine import KINDS
 from headimpact_service.jobs.fit import Fit, _register
 from headimpact_service.jobs.runs import House
@@ -94,7 +94,13 @@ class TestFit:
         fill(database, mine)
         done = do(order(api), in_child=True)
         assert done["state"] == "succeeded", done
-        assert done["result"] == {"version": "spring", "skipped": None, "promoted": False, "gates": None}
+        assert done["result"] == {
+            "version": "spring",
+            "skipped": None,
+            "promoted": False,
+            "not_promoted": None,
+            "gates": None,
+        }
         model = api.get("/v1/models/spring").json()
         assert model["basis"] == "cohort"
         assert model["aliases"] == ["candidate"]
@@ -429,7 +435,32 @@ class TestRegistration:
         assert api.post("/v1/models", json=document | {"version": "laksari-2020", "incidence": 0.1}).status_code == 409
 
 
+def meanwhile(monkeypatch: pytest.MonkeyPatch, work: Callable[[], None]) -> None:
+    """Have something happen once between a fit and its registration."""
+    fitted = fit_compute._fitted
+
+    def late(*given: Any) -> Any:
+        found = fitted(*given)
+        monkeypatch.setattr(fit_compute, "_fitted", fitted)
+        work()
+        return found
+
+    monkeypatch.setattr(fit_compute, "_fitted", late)
+
+
 WEEKLY = {"cron": "30 3 * * 1", "fit": {name: value for name, value in QUICK.items() if name != "version"}}
+LENIENT = WEEKLY | {
+    "promote": True,
+    "gates": {
+        "min_events": 5,
+        "min_athletes_with_events": 3,
+        "max_auc_loss": 1.0,
+        "expected_over_observed": [0.01, 100.0],
+        "calibration_slope": [-10.0, 10.0],
+        "waive_lowering": ["bam"],
+        "max_panel_change": 1.0,
+    },
+}
 
 
 class TestSchedules:
@@ -536,16 +567,7 @@ class TestSchedules:
         assert "did not pass every gate of its schedule (events" in self.page(api, held["version"])
         assert api.get("/v1/models/aliases/active").json()["version"] == "laksari-2020"
         api.delete("/v1/schedules/strict")
-        lenient = {
-            "min_events": 5,
-            "min_athletes_with_events": 3,
-            "max_auc_loss": 1.0,
-            "expected_over_observed": [0.01, 100.0],
-            "calibration_slope": [-10.0, 10.0],
-            "waive_lowering": ["bam"],
-            "max_panel_change": 1.0,
-        }
-        api.put("/v1/schedules/lenient", json=WEEKLY | {"promote": True, "gates": lenient})
+        api.put("/v1/schedules/lenient", json=LENIENT)
         (job,) = self.fire(database)
         done = do({"id": ids.encode("job", job.id)})["result"]
         assert [gate["gate"] for gate in done["gates"] if not gate["passed"]] == []
@@ -554,6 +576,56 @@ class TestSchedules:
         assert active["version"] == done["version"]
         assert "Passed all gates of the schedule lenient" in active["reason"]
         assert "The model passed every gate of its schedule." in self.page(api, done["version"])
+
+    def test_what_a_person_makes_active_while_it_is_fitted_stays_so(
+        self, api: Api, database: Database, mine: bytes, do: Do, spring: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        fill(database, mine, 400, athletes=60)
+        api.put("/v1/schedules/lenient", json=LENIENT)
+        (job,) = self.fire(database)
+
+        def by_hand() -> None:
+            register(api, spring)
+            change = {"version": "spring", "reason": "By hand."}
+            assert api.put("/v1/models/aliases/active", json=change, headers={"if-match": '"0"'}).status_code == 200
+
+        meanwhile(monkeypatch, by_hand)
+        done = do({"id": ids.encode("job", job.id)})["result"]
+        assert all(gate["passed"] for gate in done["gates"])
+        assert done["promoted"] is False
+        assert "judged against laksari-2020, but spring is active now" in done["not_promoted"]
+        assert api.get("/v1/models/aliases/active").json()["version"] == "spring"
+        assert api.get("/v1/models/aliases/candidate").json()["version"] == done["version"]
+
+    def test_a_model_that_lacks_a_point_which_was_set_is_not_promoted_by_its_schedule(
+        self, api: Api, database: Database, mine: bytes, do: Do
+    ) -> None:
+        fill(database, mine, 400, athletes=60)
+        only = {"fit": WEEKLY["fit"] | {"criteria": ["bric"]}, "gates": LENIENT["gates"] | {"waive_lowering": ["bric"]}}
+        assert api.put("/v1/schedules/lenient", json=LENIENT | only).status_code == 201
+        point = {"criterion": "bam", "sensitivity": 0.9}
+        assert api.patch("/v1/settings", json={"operating_points": [point]}).status_code == 200
+        (job,) = self.fire(database)
+        done = do({"id": ids.encode("job", job.id)})["result"]
+        assert done["promoted"] is False
+        assert all(gate["passed"] for gate in done["gates"])
+        assert "bam" in done["not_promoted"]
+        assert api.get("/v1/models/aliases/active").json()["version"] == "laksari-2020"
+
+    def test_of_two_jobs_of_a_schedule_that_overlap_one_learns_the_cohort(
+        self, api: Api, database: Database, mine: bytes, do: Do, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        fill(database, mine)
+        api.put("/v1/schedules/weekly", json=WEEKLY)
+        (first,) = self.fire(database, timedelta(days=8))
+        (second,) = self.fire(database, timedelta(days=16))
+        versions: list[str] = []
+        meanwhile(monkeypatch, lambda: versions.append(do({"id": ids.encode("job", second.id)})["result"]["version"]))
+        done = do({"id": ids.encode("job", first.id)})["result"]
+        assert versions[0].startswith("fit-")
+        assert (done["version"], "since the last fit" in done["skipped"]) == (None, True)
+        listed = [model["version"] for model in api.get("/v1/models").json()["data"]]
+        assert listed == [versions[0], "laksari-2020"]
 
     @staticmethod
     def page(api: Api, version: str) -> str:
