@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails, from_json
 
 from headimpact_service.broken_rules import RULES, broken_rule
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
+from headimpact_service.ingest.json_members import repeated_members
 
 Body = TypeVar("Body", bound=BaseModel)
 
@@ -41,9 +42,18 @@ def parse(data: bytes, model: type[Body], *, what: str = "body") -> Body:
 def validated(data: bytes, model: type[Body], *, what: str) -> Body:
     """The same of a text that is known to be bounded."""
     try:
-        return model.model_validate_json(data)
+        body = model.model_validate_json(data)
     except ValidationError as error:
         raise validation_problem(error, data, what=what) from None
+    if twice := member_errors(data, body):
+        raise rules_problem(twice, what=what)
+    return body
+
+
+def member_errors(data: bytes, made: object) -> list[PayloadError]:
+    """The first 20 members of a JSON text that stand in their object before, of which only the last was taken."""
+    steps = islice(repeated_members(data, made), MAX_ERRORS)
+    return [PayloadError("This member stands twice in its object.", "member-twice", pointer(place)) for place in steps]
 
 
 def require_bounded(data: bytes, what: str) -> None:

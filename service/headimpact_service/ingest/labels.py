@@ -26,7 +26,7 @@ from headimpact_service.ingest.impact_json import (
     Plane,
     Strict,
 )
-from headimpact_service.ingest.json_faults import payload_errors
+from headimpact_service.ingest.json_faults import member_errors, payload_errors
 from headimpact_service.ingest.times import TimeError, instant
 
 _PRINTABLE = re.compile(PRINTABLE)
@@ -39,9 +39,10 @@ def _json(value: Any) -> Any:  # noqa: ANN401 - validated after
     if not isinstance(value, str) or not value.startswith("{"):
         return value
     try:
-        return from_json(value)
+        made = from_json(value)
     except ValueError:
         return value
+    return value if member_errors(value.encode(), made) else made
 
 
 def _location(value: Any) -> Any:  # noqa: ANN401 - validated after

@@ -14,7 +14,7 @@ from headimpact.recording import AxesName
 from headimpact_service.errors import PayloadError, Problem
 from headimpact_service.ingest.impact_json import MAX_RATE_HZ, MIN_RATE_HZ, Axes, Filter, Name
 from headimpact_service.ingest.impact_reading import low_pass
-from headimpact_service.ingest.json_faults import payload_errors, validation_problem
+from headimpact_service.ingest.json_faults import member_errors, payload_errors, validation_problem
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.times import TimeError, instant, known_zone
 
@@ -100,12 +100,14 @@ class _Reading:
             return None
         data = text.encode("utf-8", "replace")
         try:
-            return Mapping.model_validate_json(data)
+            mapping = Mapping.model_validate_json(data)
         except ValidationError as error:
             problem = validation_problem(error, data, what="mapping")
             malformed = PayloadError(detail=problem.detail, code="not-json", pointer="")
             self._refuse("mapping", problem.errors or [malformed], keep_pointer=True)
             return None
+        self._refuse("mapping", member_errors(data, mapping), keep_pointer=True)
+        return mapping
 
     def filter(self) -> LowPass | None:
         """The field `filter`: a name, or JSON with a cut-off for each signal."""
@@ -117,6 +119,7 @@ class _Reading:
         except ValidationError as error:
             self._refuse("filter", payload_errors(error.errors(include_url=False, include_input=False), None))
             return None
+        self._refuse("filter", member_errors(text.encode("utf-8", "replace"), choice))
         return low_pass(choice)
 
     def flag(self, name: str) -> bool:

@@ -128,6 +128,15 @@ class TestBodies:
             assert number not in answer.text.replace("NaN and Infinity are refused", "")
         assert_nothing_stored(api)
 
+    def test_a_member_that_is_named_twice_is_refused_at_its_place(self, api: Api) -> None:
+        for path, body in (("/v1/score", {"kinematics": kinematics()}), ("/v1/impacts", impact_body())):
+            twice = json.dumps(body).replace('"linear_acceleration"', '"axes": "sae_j211", "linear_acceleration"')
+            answer = api.post(path, content=twice, headers={"Content-Type": "application/json"})
+            assert answer.status_code == 422, answer.text
+            [error] = answer.json()["errors"]
+            assert (error["pointer"], error["code"]) == ("/kinematics/axes", "member-twice")
+        assert_nothing_stored(api)
+
     def test_up_to_twenty_errors_are_listed(self, api: Api) -> None:
         body = impact_body()
         body["kinematics"]["linear_acceleration"]["x"] = ["1"] * 100
