@@ -62,6 +62,7 @@ def detect(data: bytes, *, filename: str | None = None, content_type: str | None
     if data.startswith(_ZIP):
         return Kind.ZIP
     if data.startswith(UTF_16):
+        _refuse_utf16_json(data)
         return Kind.CSV
     known = next((kind for magic, kind in _READ_BINARY.items() if data.startswith(magic)), None)
     if known is not None:
@@ -70,6 +71,13 @@ def detect(data: bytes, *, filename: str | None = None, content_type: str | None
     if head.startswith((b"{", b"[")):
         return Kind.NDJSON if _is_ndjson(head, filename, content_type) else Kind.JSON
     return Kind.CSV
+
+
+def _refuse_utf16_json(data: bytes) -> None:
+    """JSON that is exchanged is UTF-8 (RFC 8259); only tables are read in a spreadsheet's UTF-16."""
+    text = "".join(data[:HEAD].decode("utf-16", "ignore").split())
+    if text.startswith(('{"', "[{")):
+        raise Problem("unreadable-file", "The file is JSON in UTF-16: write it in UTF-8.")
 
 
 def _refuse_binary(data: bytes) -> None:

@@ -52,6 +52,15 @@ def test_a_file_may_hold_a_list(wrap: Any):
     assert ids(read(json.dumps(wrap(many)))) == ["a", "b"]
 
 
+@pytest.mark.parametrize(
+    "text", [encoded(body()).decode(), json.dumps([body()], indent=2), f"\n{json.dumps(body())}\n{{}}"]
+)
+@pytest.mark.parametrize(("mark", "encoding"), [(b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be")])
+def test_json_in_utf16_is_refused_and_hears_of_utf8(text: str, mark: bytes, encoding: str):
+    problem = refused(mark + text.encode(encoding))
+    assert (problem.slug, problem.detail) == ("unreadable-file", "The file is JSON in UTF-16: write it in UTF-8.")
+
+
 def test_a_bad_impact_of_a_list_is_its_own_problem():
     bad = body(external_id="b")
     bad["kinematics"]["angular_velocity"]["unit"] = "rpm"
