@@ -59,6 +59,7 @@ class CsvTable:
     """The headings of a CSV file, and its columns when they are asked for."""
 
     parted = False
+    wordless = frozenset[int]()
 
     def __init__(self, stream: BinaryIO, *, skip_rows: int = 0) -> None:
         """Look through the file, then read as far as the headings; 422 where there are none."""

@@ -116,6 +116,7 @@ class GuardedTable:
         self.units = {int(column): str(unit) for column, unit in fields.fields["units"].items()}
         self.dated = frozenset(map(int, fields.fields["dated"]))
         self.parted = bool(fields.fields["parted"])
+        self.wordless = frozenset(map(int, fields.fields["wordless"]))
         self._sampled = str(fields.fields["sampled"])
 
     def has_samples(self, place: int) -> bool:

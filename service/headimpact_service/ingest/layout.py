@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,6 +64,7 @@ class SignalLayout:
 class Layout:
     """Every column that is read, by its index."""
 
+    headings: tuple[str, ...]
     signals: dict[SignalName, SignalLayout]
     clock: Clock | None
     other_clocks: tuple[Clock, ...]
@@ -133,13 +134,18 @@ class Layout:
         """The same, with the columns beside it that may say other times."""
         return replace(self, others=other_times(headings, {*self.numbers, *self.texts}, has_samples))
 
-    def watching(self, headings: Headings) -> Layout:
+    def watching(self, wordless: Collection[int]) -> Layout:
         """The same, with the columns beside it that may tell several impacts from one."""
         if self.sample_number is not None:
             return self
-        read = {*self.numbers, *self.texts}
-        found = unread_columns(headings.written, read, timed=self.is_timed, keyed=bool(self.keys))
+        passed = {*self.numbers, *self.texts, *wordless}
+        found = unread_columns(self.headings, passed, timed=self.is_timed, keyed=bool(self.keys))
         return replace(self, unread=found)
+
+    def named(self, column: int) -> str:
+        """A column as a message names it, by its number and its heading."""
+        heading = self.headings[column]
+        return f"Column {column + 1} ({heading})" if heading else f"Column {column + 1}"
 
 
 def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> Layout:
@@ -172,6 +178,7 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
     own = all(signal.clock for signal in signals.values())
     clock, *other_clocks = _clocks(mapping, headings, "time" in required, own=own) or [None]
     return Layout(
+        headings=headings.written,
         signals=signals,
         clock=clock,
         other_clocks=tuple(filter(None, other_clocks)),

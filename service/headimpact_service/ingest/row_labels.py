@@ -4,15 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.layout import Layout
-from headimpact_service.ingest.unread import are_several, begins_anew, lie_apart, longest_s, moment_of, span_s
+from headimpact_service.ingest.unread import (
+    are_several,
+    begins_anew,
+    lie_apart,
+    lie_in_blocks,
+    longest_s,
+    moment_of,
+    span_s,
+    tell_parts,
+)
 from headimpact_service.ingest.windows import Rows, numbers_of
 
 _OR_ONE = "; if they are one, say so by an empty group_by"
+_SAY = "does not say the same"
+_TIME = "does not say one time"
+_COUNT = "does not count on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,22 +57,23 @@ class RowLabels:
         self._require_unread_alike(time_zone)
         for column in self.layout.labels:
             if len([cell for cell in self._distinct(column) if cell]) > 1:
-                raise self._several(f"Column {column + 1} does not say the same")
+                raise self._several(column, _SAY)
         if any(len(self._distinct(column)) > 1 for column in self.layout.occurred_at):
             self._require_one_time(self.layout.occurred_at, time_zone)
 
     def _require_unread_alike(self, time_zone: str | None) -> None:
-        """The same of columns that are not read otherwise, by what their headings say they are."""
+        """The same of columns that are not read otherwise, by what their headings or their cells say they are."""
         unread = self.layout.unread
-        for column in unread.names:
-            if are_several(self._cells(column)):
-                raise self._several(f"Column {column + 1} does not say the same", _OR_ONE)
-        for column in unread.times:
-            if lie_apart(self._cells(column), time_zone):
-                raise self._several(f"Column {column + 1} does not say one time", _OR_ONE)
-        for column in unread.counters:
-            if begins_anew(self._cells(column)):
-                raise self._several(f"Column {column + 1} does not count on", _OR_ONE)
+        for columns, tell, what in (
+            (unread.names, are_several, _SAY),
+            (unread.times, partial(lie_apart, time_zone=time_zone), _TIME),
+            (unread.counters, begins_anew, _COUNT),
+            (unread.others, tell_parts, _SAY),
+            (unread.marks, partial(lie_in_blocks, marks=True), _SAY),
+        ):
+            for column in columns:
+                if tell(self._cells(column)):
+                    raise self._several(column, what, _OR_ONE)
 
     def _cells(self, column: int) -> list[str]:
         cells = self.texts[column]
@@ -76,11 +90,14 @@ class RowLabels:
         moments = [moment_of("T".join(parts), time_zone) for parts in told if all(parts)]
         known = [when for when in moments if when is not None]
         if known and span_s(known) > longest_s(len(rows)):
-            raise self._several("The time of the impact is not the same")
+            raise self._several(columns[0], _TIME)
 
-    def _several(self, what: str, otherwise: str = "") -> Problem:
+    def _several(self, column: int, what: str, otherwise: str = "") -> Problem:
+        heading = self.layout.headings[column]
+        parting = f' (["{heading}"], if that tells them apart)' if heading else ""
         return file_fault(
-            f"{what} in all rows of the impact that begins in row {self.row + 1} below the headings: if they are "
-            f"several impacts, tell them apart by a column impact_id or a mapping's group_by{otherwise}.",
+            f"{self.layout.named(column)} {what} in all rows of the impact that begins in row {self.row + 1} below the "
+            f"headings: if they are several impacts, tell them apart by a column impact_id or a mapping's group_by"
+            f"{parting}{otherwise}.",
             "several-impacts",
         )

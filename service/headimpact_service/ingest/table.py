@@ -47,6 +47,10 @@ class Table(Protocol):
     def parted(self) -> bool:
         """Whether the format itself parts the impacts, so that every block has `lengths`."""
 
+    @property
+    def wordless(self) -> Collection[int]:
+        """Columns whose cells cannot be read as text."""
+
     def has_samples(self, place: int) -> bool:
         """Whether a column may hold a number for each sample; one that does not may be read as text."""
 

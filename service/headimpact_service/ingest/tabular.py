@@ -41,7 +41,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     if options.mapping is None or "time" not in options.mapping.model_fields_set:
         layout = layout.beside(headings, table.has_samples)
     if not (table.parted or _names_one_impact(options)):
-        layout = layout.watching(headings)
+        layout = layout.watching(table.wordless)
     blocks = table.blocks(layout.numbers, layout.texts)
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
     count = 0

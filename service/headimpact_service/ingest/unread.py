@@ -8,10 +8,12 @@ A mapping's empty ``group_by`` says that all rows are one impact.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import pairwise
+from itertools import groupby, pairwise
+
+import numpy as np
 
 from headimpact_service.ingest.cells import is_written_number, said
 from headimpact_service.ingest.impact_json import MIN_RATE_HZ
@@ -25,15 +27,24 @@ _NAMES = frozenset(
         *("player", "athlete", "subject", "wearer", "user", "participant", "team", "sensor", "device"),
     }
 )
+_PARTS = frozenset(
+    {
+        *("case", "no", "nr", "num", "number", "seq", "sequence", "series", "set", "batch", "round", "take", "code"),
+        *("clip", "video", "play", "match", "game", "quarter", "week", "day"),
+        *("helmet", "headform", "mouthguard", "mg", "condition", "group", "cluster"),
+    }
+)
+"""Words of what may differ from impact to impact; they tell only where nothing else would."""
 _PERSONS = frozenset({"player", "athlete", "subject", "wearer", "user", "participant"})
 _MEASURED = frozenset(
     {
         *("temp", "temperature", "battery", "voltage", "volt", "charge", "current", "pressure", "humidity", "force"),
         *("saturated", "saturation", "proximity", "distance", "light", "quality", "valid", "threshold"),
-        *("is", "flag", "trigger", "triggered", "active", "state", "status"),
     }
 )
-"""Words of what changes within an impact, whatever it is of: a sensor's temperature, an event's flag."""
+"""Words of what is measured, whatever it is of: a sensor's temperature."""
+_MARKS = frozenset({"is", "flag", "trigger", "triggered", "active", "state", "status", "error"})
+"""Words of what comes and goes within an impact: an event's flag."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
@@ -43,46 +54,62 @@ ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
 STAY = 10
 """What is no time and stays for so many rows on average is none of the samples'."""
+MAX_OTHERS = 16
+"""So many columns whose headings say nothing are looked at: a table may have a thousand of what is measured."""
+SHORTEST = 3
+"""Samples of an impact."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unread:
-    """Columns by what their headings say: names of something, times, and numbers of samples."""
+    """Columns by what their headings say: names of something, times, numbers of samples, anything, and yes or no."""
 
     names: tuple[int, ...] = ()
     times: tuple[int, ...] = ()
     counters: tuple[int, ...] = ()
+    others: tuple[int, ...] = ()
+    marks: tuple[int, ...] = ()
 
     @property
     def columns(self) -> tuple[int, ...]:
         """All of them."""
-        return (*self.names, *self.times, *self.counters)
+        return (*self.names, *self.times, *self.counters, *self.others, *self.marks)
 
 
 NOTHING_UNREAD = Unread()
 
 
-def unread_columns(headings: Sequence[str], read: Collection[int], *, timed: bool, keyed: bool) -> Unread:
-    """The columns beside those that are read whose headings speak of impacts, of times or of samples.
+def unread_columns(headings: Sequence[str], passed: Collection[int], *, timed: bool, keyed: bool) -> Unread:
+    """The columns, but for some that are `passed` over, whose headings speak of impacts, of times or of samples.
 
     Of a table whose samples have times only names; where nothing tells impacts apart, only those of people: an event
-    may be marked within one impact.
+    may be marked within one impact. Where neither times nor names tell, columns whose headings say nothing, too.
     """
-    telling = _NAMES if keyed or not timed else _PERSONS
-    names: list[int] = []
-    times: list[int] = []
-    counters: list[int] = []
+    alone = not (timed or keyed)
+    telling = _NAMES | _PARTS if alone else _NAMES if keyed else _PERSONS
+    found: dict[str, list[int]] = {}
     for column, heading in enumerate(headings):
         words = {word.lower() for word in _WORD.findall(heading)}
-        if column in read:
+        if column in passed or (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
             continue
-        if words & _COUNTERS:
-            counters += [] if timed else [column]
-        elif words & _TIMES:
-            times += [] if timed else [column]
-        elif words & telling and not words & _MEASURED:
-            names.append(column)
-    return Unread(tuple(names), tuple(times), tuple(counters))
+        if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks"}:
+            found.setdefault(kind, []).append(column)
+    return Unread(**{kind: tuple(columns) for kind, columns in found.items()})
+
+
+def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> str | None:
+    """What a heading of these words may tell, if anything; `alone` if nothing that is read would."""
+    if words & _COUNTERS:
+        return None if timed else "counters"
+    if words & _TIMES:
+        return None if timed else "times"
+    if words & _MEASURED:
+        return None
+    if words & _MARKS:
+        return "marks" if alone else None
+    if words & telling:
+        return "names"
+    return "others" if alone else None
 
 
 def begins_anew(cells: Sequence[str]) -> bool:
@@ -102,6 +129,34 @@ def are_several(cells: Sequence[str]) -> bool:
     if {word.lower() for word in distinct} in _YES_OR_NO and sum(a != b for a, b in pairwise(told)) > 1:
         return False  # a mark that came and went
     return 1 < len(distinct) < len(cells) and not any(map(_WITH_PARTS.fullmatch, distinct))
+
+
+def tell_parts(cells: Sequence[str]) -> bool:
+    """Whether a column parts its rows as impacts are parted, whatever it is called: in blocks, or counting anew."""
+    return lie_in_blocks(cells) or _counts_anew(cells)
+
+
+def _counts_anew(cells: Sequence[str]) -> bool:
+    """Whether a column counts its rows one by one and begins at its first number again, as a data frame's index may."""
+    steps = np.diff(told) if (told := _numbers(cells)) and len(told) == len(cells) else np.empty(0)
+    again = steps != 1.0
+    return bool(again.any() and 3 * again.sum() <= again.size and (np.array(told)[1:][again] == told[0]).all())
+
+
+def lie_in_blocks(cells: Sequence[str], *, marks: bool = False) -> bool:
+    """Whether every value has rows of its own that follow each other, and two have as many, as numbers of impacts do.
+
+    Of `marks`, yes and no are none.
+    """
+    lengths: dict[str, int] = {}
+    for text, run in groupby(map(said, cells)):
+        length = sum(1 for _ in run)
+        if length < SHORTEST or not text or text in lengths or _WITH_PARTS.fullmatch(text):
+            return False
+        lengths[text] = length
+    if marks and {word.lower() for word in lengths} in _YES_OR_NO:
+        return False
+    return len(set(lengths.values())) < len(lengths)
 
 
 def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:

@@ -290,7 +290,9 @@ def answered(*frames: wire.Frame | bytes) -> Iterator[guard.GuardedTable | guard
         theirs.close()
 
 
-TABLE = wire.Frame("table", {"name": None, "headings": ["a"], "units": {}, "dated": [], "parted": True, "sampled": "1"})
+TABLE = wire.Frame(
+    "table", {"name": None, "headings": ["a"], "units": {}, "dated": [], "wordless": [], "parted": True, "sampled": "1"}
+)
 
 
 @pytest.mark.parametrize(
@@ -324,9 +326,21 @@ def test_a_frame_that_is_not_what_was_asked_for_ends_the_reading(frame: wire.Fra
     "frame",
     [
         wire.Frame("table", {"name": None, "headings": ["a"]}),
-        wire.Frame("table", {"name": None, "headings": 7, "units": {}, "dated": [], "parted": True, "sampled": "1"}),
         wire.Frame(
-            "table", {"name": None, "headings": [], "units": {"x": "g"}, "dated": [], "parted": True, "sampled": ""}
+            "table",
+            {"name": None, "headings": 7, "units": {}, "dated": [], "wordless": [], "parted": True, "sampled": "1"},
+        ),
+        wire.Frame(
+            "table",
+            {
+                "name": None,
+                "headings": [],
+                "units": {"x": "g"},
+                "dated": [],
+                "wordless": [],
+                "parted": True,
+                "sampled": "",
+            },
         ),
         wire.Frame("refused", {"slug": "no-such-problem", "detail": "x"}),
         wire.Frame("refused", {}),

@@ -279,3 +279,22 @@ def test_a_time_that_all_rows_share_is_the_impact_s_and_not_its_samples():
     columns = {"timestamp": when} | {name: pa.array(column) for name, column in zip(COLUMNS, values.T, strict=True)}
     [record] = records(parquet(pa.table(columns)), sample_rate_hz=2000.0)
     assert record.recording.linear_acceleration.sample_rate_hz == 2000.0
+
+
+@every_writer
+def test_a_column_that_parts_rows_without_times_is_seen_beside_columns_of_any_type(
+    write: Callable[[pa.Table], bytes],
+):
+    rows = len(noise()) * 40
+    untimed = wide(noise()).drop_columns(["external_id", "t_ms"])
+    untimed = untimed.append_column("marks", pa.array([[1, 2]] * rows, pa.list_(pa.int8())).cast(pa.list_(pa.string())))
+    parted = untimed.append_column("k", pa.array(np.repeat([1.0, 2.0, 3.0], 40)))
+    assert codes(refused(write(parted), sample_rate_hz=1000.0)) == [(None, "several-impacts")]
+    [record] = records(write(untimed), sample_rate_hz=1000.0)
+    assert samples_of(record).shape == (rows, 6)
+
+
+@every_writer
+def test_a_column_of_nulls_says_nothing(write: Callable[[pa.Table], bytes]):
+    [record] = records(write(wide(noise(1)).append_column("athlete", pa.nulls(40))))
+    assert record.athlete_external_id is None

@@ -33,6 +33,19 @@ def shape(record: ImpactRecord) -> int:
     ("heading", "cells"),
     [
         *((name, each(1, 2, 3)) for name in ("Impact", "Impact #", "Impact No.", "impactNumber", "Event ID", "hit_id")),
+        *(
+            (name, each(*names))
+            for name in ("case", "No", "Nr.", "seq", "clip", "MG", "Helmet", "set", "series", "condition", "week")
+            for names in ((1, 2, 3), ("imp0", "imp1", "imp2"), (1.0, 2.0, 3.0))
+        ),
+        *(
+            (name, each(*names))
+            for name in ("k", "label", "Auswahl")
+            for names in ((7, 8, 9), ("c", "a", "b"), (0, 1, 2))
+        ),
+        ("n", [*range(SAMPLES)] * 3),
+        ("", [*range(SAMPLES)] * 3),
+        ("trigger", each(1, 2, 3)),
         ("uuid", each("a3", "b7", "c1")),
         ("Player", each("A", "B", "A")),
         ("file name", each("a.csv", "b.csv", "c.csv")),
@@ -81,6 +94,15 @@ def test_rows_that_an_unread_column_tells_apart_are_refused(heading: str, cells:
         ("Event Flag", [int(n > 9) for n in range(SAMPLES)]),
         ("Is Impact", [str(n > 9).lower() for n in range(SAMPLES)]),
         ("Sensor Saturated", [int(n > 9) for n in range(SAMPLES)]),
+        ("phase", ["pre"] * 10 + ["impact"] * 12 + ["post"] * 18),
+        ("label", ["pre"] * 10 + ["impact"] * 20 + ["pre"] * 10),
+        ("status", [0] * 20 + [1] * 20),
+        ("triggered", ["no"] * 20 + ["yes"] * 20),
+        ("heart rate", [72] * 40),
+        ("altitude", [round(54.1 + n // 10 / 10, 1) for n in range(SAMPLES)]),
+        ("counts", np.rint(900 * np.sin(np.arange(SAMPLES) / 9)).astype(int).tolist()),
+        ("", [""] * SAMPLES),
+        ("notes", ["hard hit", *[""] * 39]),
         ("Device Event", ["T" if n == 9 else "N" for n in range(SAMPLES)]),
         ("Player", [*[""] * 39, "A"]),
     ],
@@ -95,6 +117,27 @@ def test_the_sender_may_say_that_they_are_one_or_what_tells_them_apart() -> None
     assert (
         shape(one(untimed("Event", each(1), records=1), sample_rate_hz=1e3, mapping=Mapping(group_by=["Event"]))) == 40
     )
+
+
+def test_a_column_that_parts_the_rows_like_impacts_is_named_with_both_remedies() -> None:
+    halves = ["pre"] * 20 + ["post"] * 20
+    problem = refused(untimed("phase", halves, records=1), sample_rate_hz=1000.0)
+    assert problem.detail == (
+        "Column 1 (phase) does not say the same in all rows of the impact that begins in row 1 below the headings: if "
+        'they are several impacts, tell them apart by a column impact_id or a mapping\'s group_by (["phase"], if that '
+        "tells them apart); if they are one, say so by an empty group_by."
+    )
+    assert shape(one(untimed("phase", halves, records=1), sample_rate_hz=1e3, mapping=Mapping(group_by=[]))) == SAMPLES
+    found = read(untimed("k", each(7, 8, 9)), sample_rate_hz=1e3, mapping=Mapping(group_by=["k"]))
+    assert [shape(record) for record in found] == [SAMPLES] * 3
+
+
+def test_what_a_column_is_called_tells_nothing_where_something_else_tells_impacts_apart() -> None:
+    text = untimed("impact_id,label", [f"1,{'pre' if n < 20 else 'post'}" for n in range(SAMPLES)], records=1)
+    assert shape(one(text, sample_rate_hz=1000.0)) == SAMPLES
+    first, *lines = csv_text().splitlines()
+    marked = [f"{number // 20},{line}" for number, line in enumerate(lines)]
+    assert shape(one("\n".join([f"case,{first}", *marked]))) == SAMPLES
 
 
 def test_a_mapping_of_the_signals_alone_keeps_the_guard() -> None:

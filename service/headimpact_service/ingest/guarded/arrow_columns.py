@@ -54,6 +54,7 @@ class ArrowTable:
         self.parted = any(map(is_list_of_numbers, self._types))
         self.dated: frozenset[int] = frozenset()
         self._elapsed = Elapsed()
+        self.wordless = [place for place, kind in enumerate(self._types) if not is_told(kind)]
         if not self.parted:  # times that say their unit by their type; those of an impact as a whole are text
             durations = (place for place, kind in enumerate(self._types) if pa.types.is_duration(kind))
             self.units = dict.fromkeys(durations, MICROSECONDS) | self.units
@@ -115,6 +116,14 @@ def _is_dated(column: pa.Array) -> bool:
         return False
 
 
+def is_told(kind: pa.DataType) -> bool:
+    """Whether cells of this type can be read as text."""
+    types = pa.types
+    kind = kind.value_type if types.is_dictionary(kind) else kind
+    told = (types.is_null, types.is_string, types.is_large_string, types.is_integer, types.is_floating)
+    return any(is_one(kind) for is_one in (*told, types.is_timestamp, types.is_boolean, types.is_date))
+
+
 def floats(column: pa.Array) -> FloatArray:
     """A column of numbers, of times in microseconds; NaN where a cell is empty."""
     if pa.types.is_timestamp(column.type):
@@ -137,6 +146,8 @@ def words(column: pa.Array) -> Words:
 
 def _texts(values: pa.Array) -> list[str]:
     kind = values.type
+    if pa.types.is_null(kind):  # of a column without any value nobody says what it would hold
+        return [""] * len(values)
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_integer(kind):
         return ["" if value is None else str(value) for value in values.to_pylist()]
     if pa.types.is_floating(kind):

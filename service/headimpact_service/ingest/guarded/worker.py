@@ -117,6 +117,7 @@ def _offer(connection: socket.socket, content: NamedTable) -> bool:
         "headings": table.headings,
         "units": units,
         "dated": list(table.dated),
+        "wordless": list(table.wordless),
         "parted": table.parted,
         "sampled": "".join("1" if table.has_samples(place) else "0" for place in range(len(table.headings))),
     }

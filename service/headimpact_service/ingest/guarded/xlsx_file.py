@@ -103,6 +103,7 @@ class SheetTable:
     """The blocks of one sheet, side by side."""
 
     parted = False
+    wordless = frozenset[int]()
 
     def __init__(self, blocks: list[_Block]) -> None:
         """Headings of all blocks, in their order."""
