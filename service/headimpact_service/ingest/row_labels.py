@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from headimpact.published import QUALITY_LIMITS
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
@@ -13,6 +14,7 @@ from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.unread import (
     are_several,
     begins_anew,
+    left_out,
     lie_apart,
     lie_in_blocks,
     longest_s,
@@ -60,6 +62,7 @@ class RowLabels:
                 raise self._several(column, _SAY)
         if any(len(self._distinct(column)) > 1 for column in self.layout.occurred_at):
             self._require_one_time(self.layout.occurred_at, time_zone)
+        self._require_counted()
 
     def _require_unread_alike(self, time_zone: str | None) -> None:
         """The same of columns that are not read otherwise, by what their headings or their cells say they are."""
@@ -74,6 +77,28 @@ class RowLabels:
             for column in columns:
                 if tell(self._cells(column)):
                     raise self._several(column, what, _OR_ONE)
+
+    def _require_counted(self) -> None:
+        """Refuse samples that are left out, as numbers of them that are not read otherwise say."""
+        for column in self.layout.unread.counters:
+            hole = left_out(self._cells(column))
+            if hole is not None:
+                raise self._counted(column, *hole)
+
+    def _counted(self, column: int, before: float, after: float, step: float) -> Problem:
+        heading, most = self.layout.headings[column], QUALITY_LIMITS["gaps"]["maximum_samples"]
+        filled = (
+            f', or name the column in a mapping ({{"sample_number": "{heading}"}}) and ask for fill_gaps, which fills '
+            f"gaps of at most {most} samples"
+            if step == 1.0 and after - before <= most + 1
+            else ""
+        )
+        return file_fault(
+            f"{self.layout.named(column)} goes on from {before:g} to {after:g} in the impact that begins in row "
+            f"{self.row + 1} below the headings: samples were left out. Send all of them{filled}; if the column does "
+            "not count the impact's samples, say so by an empty group_by.",
+            "sample-order",
+        )
 
     def _cells(self, column: int) -> list[str]:
         cells = self.texts[column]

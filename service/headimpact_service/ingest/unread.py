@@ -131,6 +131,20 @@ def are_several(cells: Sequence[str]) -> bool:
     return 1 < len(distinct) < len(cells) and not any(map(_WITH_PARTS.fullmatch, distinct))
 
 
+def left_out(cells: Sequence[str]) -> tuple[float, float, float] | None:
+    """Where numbers that count samples in steps of one size first leave some out: before, behind, and the step."""
+    told = np.array(_numbers(cells))
+    steps = np.diff(told)
+    if not steps.size or len(told) < len(cells) or (steps <= 0).any():
+        return None
+    sizes, counts = np.unique(steps, return_counts=True)
+    step = float(sizes[counts.argmax()])
+    if 2 * counts.max() <= steps.size or (steps % step).any():
+        return None
+    holes = np.flatnonzero(steps > step)
+    return (float(told[holes[0]]), float(told[holes[0] + 1]), step) if holes.size else None
+
+
 def tell_parts(cells: Sequence[str]) -> bool:
     """Whether a column parts its rows as impacts are parted, whatever it is called: in blocks, or counting anew."""
     return lie_in_blocks(cells) or _counts_anew(cells)

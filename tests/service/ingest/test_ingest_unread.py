@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from ingest_files import codes, csv_text, one, read, refused, six_axis
 
+from headimpact.preparation import prepare
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 
@@ -154,6 +155,41 @@ def test_times_that_differ_are_those_of_several_impacts_though_the_sender_gives_
     broken = untimed("occurred_at", each("37:10.6"), records=1)
     found = one(broken, sample_rate_hz=1000.0, occurred_at="2026-11-20T19:00:00Z")
     assert found.occurred_at is not None
+
+
+def counted(heading: str, numbers: Sequence[int]) -> str:
+    """One impact whose rows are those samples of it that are numbered."""
+    first, *lines = untimed(heading, range(SAMPLES), records=1).splitlines()
+    return "\n".join([first, *(lines[number] for number in numbers)])
+
+
+@pytest.mark.parametrize("heading", ["Sample", "Frame", "Sample Num", "index", "impact_id,Sample"])
+def test_numbers_of_samples_that_leave_some_out_are_refused_with_what_helps(heading: str) -> None:
+    text = counted(heading, [n for n in range(SAMPLES) if n != 15])
+    if "," in heading:
+        text = text.replace("\n", "\ni1,")
+    problem = refused(text, sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "sample-order")]
+    name = heading.rpartition(",")[2]
+    assert f"({name}) goes on from 14 to 16" in problem.detail
+    assert f'{{"sample_number": "{name}"}}' in problem.detail
+    filled = one(text, sample_rate_hz=1000.0, fill_gaps=True, mapping=Mapping(sample_number=[name]))
+    assert [note.code for note in prepare(filled.recording).notes if note.code == "gaps_filled"]
+    assert codes(refused(text, sample_rate_hz=1000.0, fill_gaps=True)) == [(None, "sample-order")]
+
+
+def test_a_gap_that_cannot_be_filled_is_refused_without_that_remedy() -> None:
+    problem = refused(counted("Sample", [*range(15), *range(19, SAMPLES)]), sample_rate_hz=1000.0)
+    assert "from 14 to 19" in problem.detail
+    assert "fill_gaps" not in problem.detail
+    every_other = refused(counted("Sample", [n for n in range(0, SAMPLES, 2) if n != 20]), sample_rate_hz=1000.0)
+    assert "from 18 to 22" in every_other.detail
+    assert "fill_gaps" not in every_other.detail
+
+
+def test_a_column_that_counts_something_else_is_passed_over_where_the_sender_says_so() -> None:
+    text = counted("Point", [n for n in range(SAMPLES) if n != 15])
+    assert shape(one(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[]))) == SAMPLES - 1
 
 
 @pytest.mark.parametrize("timed", [False, True])
