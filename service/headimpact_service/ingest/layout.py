@@ -12,7 +12,8 @@ from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.mapping import TIME_UNITS, DateAndTime, Mapping, SignalColumns
 from headimpact_service.ingest.other_times import NO_OTHERS, OtherTimes, other_times
-from headimpact_service.ingest.spelling import unit_spelled
+from headimpact_service.ingest.spelling import unit_ending, unit_spelled
+from headimpact_service.ingest.supplied import Kind, Supplied, spoken_in, supplied_in
 from headimpact_service.ingest.unread import NOTHING_UNREAD, Unread, unread_columns
 
 
@@ -40,7 +41,8 @@ class SignalLayout:
     unit: str
     components: tuple[Component, Component, Component]
     clock: Clock | None = None
-    resultant: int | None = None
+    resultants: tuple[Supplied, ...] = ()
+    peaks: tuple[Supplied, ...] = ()
     sample_rate_hz: float | None = None
     full_scale: float | None = None
 
@@ -104,7 +106,7 @@ class Layout:
         signals = self.signals.values()
         all_clocks = (*self.clocks, *(signal.clock for signal in signals))
         clocks = [clock.column for clock in all_clocks if clock is not None]
-        resultants = [signal.resultant for signal in signals if signal.resultant is not None]
+        resultants = [one.column for signal in signals for one in signal.resultants]
         counted = [] if self.sample_number is None else [self.sample_number]
         others = [clock.column for clock in self.others.clocks]
         components = (column for signal in signals for column in signal.columns)
@@ -114,9 +116,14 @@ class Layout:
     def texts(self) -> list[int]:
         """Columns that are read as text."""
         one_each = (self.external_id, self.athlete, self.device, self.unscorable, self.time_base)
-        named = (*one_each, *self.keys, *self.occurred_at, *self.context.values(), *self.reading.values())
+        named = (*one_each, *self.keys, *self.occurred_at, *self.context.values(), *self.reading.values(), *self.peaks)
         others = [rate.column for rate in self.others.rates]
         return sorted({column for column in (*named, *others, *self.unread.columns) if column is not None})
+
+    @property
+    def peaks(self) -> list[int]:
+        """Columns of peaks that the device supplies."""
+        return [one.column for signal in self.signals.values() for one in signal.peaks]
 
     @property
     def is_timed(self) -> bool:
@@ -133,6 +140,22 @@ class Layout:
     def beside(self, headings: Headings, has_samples: Callable[[int], bool]) -> Layout:
         """The same, with the columns beside it that may say other times."""
         return replace(self, others=other_times(headings, {*self.numbers, *self.texts}, has_samples))
+
+    def comparing(self, headings: Headings, wordless: Collection[int], *, parted: bool) -> Layout:
+        """The same, with the resultants and peaks beside it; where the format parts impacts, peaks are no samples."""
+        passed = {*self.numbers, *self.texts}
+        unnamed = [name for name, signal in self.signals.items() if not _name_units(name, signal.columns, headings)]
+        signals = dict(self.signals)
+        units = {name: signal.unit for name, signal in signals.items()}
+        for name, kind, found in spoken_in(headings, units, unnamed):
+            signal = signals[name]
+            if found.column in passed:
+                continue
+            if kind == "resultant" and (found.column in wordless or not parted):
+                signals[name] = replace(signal, resultants=(*signal.resultants, found))
+            elif kind == "peak" and found.column not in wordless:
+                signals[name] = replace(signal, peaks=(*signal.peaks, found))
+        return replace(self, signals=signals)
 
     def watching(self, wordless: Collection[int]) -> Layout:
         """The same, with the columns beside it that may tell several impacts from one."""
@@ -208,12 +231,14 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: fr
         raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)
     _require_distinct(name, (x, y, z))
-    first = min(component.column for component in (x, y, z) if component.column is not None)
+    places = [component.column for component in (x, y, z) if component.column is not None]
+    unit = _unit(name, columns, _units_beside(name, places, headings))
     return SignalLayout(
-        unit=_unit(name, columns, _units_beside(name, (x, y, z), headings)),
+        unit=unit,
         components=(x, y, z),
-        clock=_own_clock(name, columns, headings, first, required=name in required),
-        resultant=_resultant(name, columns, headings, required=f"{name}.resultant" in required),
+        clock=_own_clock(name, columns, headings, min(places), required=name in required),
+        resultants=_supplied(name, "resultant", columns, unit, headings, required),
+        peaks=_supplied(name, "peak", columns, unit, headings, required),
         sample_rate_hz=columns.sample_rate_hz,
         full_scale=columns.range,
     )
@@ -244,17 +269,29 @@ def _own_clock(
     return None
 
 
-def _resultant(name: SignalName, columns: SignalColumns, headings: Headings, *, required: bool) -> int | None:
-    column = None if columns.resultant is None else headings.find(columns.resultant)
-    if column is None and required:
-        raise _missing(f"The column of the resultant of {name} was not found.", f"/{name}/resultant")
-    return column
+def _supplied(
+    name: SignalName, kind: Kind, columns: SignalColumns, unit: str, headings: Headings, required: frozenset[str]
+) -> tuple[Supplied, ...]:
+    """The column of the device's own resultants or peaks that a mapping names."""
+    spellings: list[str] | None = getattr(columns, kind)
+    column = None if spellings is None else headings.find(spellings)
+    if column is not None:
+        return (supplied_in(name, unit, column, headings),)
+    if f"{name}.{kind}" in required:
+        raise _missing(f"The column of the {kind} of {name} was not found.", f"/{name}/{kind}")
+    return ()
 
 
-def _units_beside(name: SignalName, components: Sequence[Component], headings: Headings) -> set[str]:
+def _units_beside(name: SignalName, columns: Sequence[int], headings: Headings) -> set[str]:
     """The units that stand beside the headings of a signal, as far as they are known."""
-    told = (headings.units.get(component.column) for component in components if component.column is not None)
+    told = (headings.units.get(column) for column in columns)
     return {unit for text in told if (unit := unit_spelled(name, text)) is not None}
+
+
+def _name_units(name: SignalName, columns: Sequence[int], headings: Headings) -> bool:
+    """Whether units stand beside the headings of a signal, or in them."""
+    written = (unit_ending(name, headings.written[column]) for column in columns)
+    return bool(_units_beside(name, columns, headings)) or any(written)
 
 
 def _unit(name: SignalName, columns: SignalColumns, beside: set[str]) -> str:

@@ -51,7 +51,8 @@ class SignalColumns(Strict):
 
     `time` and `sample_rate_hz` are for a sensor that has its own. Of several columns of times with one heading, a
     signal's is the nearest before its own. The rows of such a sensor end where its samples, and its time if it has a
-    column of it, are empty. `resultant` is the device's own, to be compared with that of the samples.
+    column of it, are empty. `resultant` and `peak` are the device's own, a value a sample and one an impact, to be
+    compared with those of the samples; they are in the signal's unit, unless their heading names another.
     """
 
     unit: str | None = None
@@ -62,6 +63,7 @@ class SignalColumns(Strict):
     sample_rate_hz: float | None = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
     range: float | None = Field(None, gt=0, description="Full scale of the sensor, in `unit`.")
     resultant: Spellings | None = None
+    peak: Spellings | None = None
 
 
 class LinearAccelerationColumns(SignalColumns):

@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from headimpact.cut_offs import PAPER
-from headimpact.quality import QualityNote
+from headimpact.quality import QualityNote, check_reported_resultant
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, check_cut, head_recording
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass
-from headimpact_service.ingest.nhtsa_header import DOUBTFUL, INVALID, SOUND, Channel, CrashTest, Occupant, read_header
+from headimpact_service.ingest.nhtsa_header import (
+    DOUBTFUL,
+    INVALID,
+    RESULTANT,
+    SOUND,
+    Channel,
+    CrashTest,
+    Occupant,
+    read_header,
+)
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.overrides import with_options
 from headimpact_service.ingest.presets import preset_named
@@ -45,7 +55,7 @@ def read_nhtsa(archive: GuardedZip, options: ImportOptions) -> Iterator[ImpactRe
     for header in sorted(name for name in archive.names if name.lower().endswith(".ev5")):
         test = read_header(archive.read(header))
         curves = _curves(archive.names, header)
-        for occupant in sorted({channel.occupant for channel in test.channels}):
+        for occupant in sorted({channel.occupant for channel in test.channels if channel.axis != RESULTANT}):
             found += 1
             if found > options.max_impacts:
                 raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
@@ -98,6 +108,7 @@ class _Head:
         )
         for name, signal in recording.signals():
             self.notes += check_cut(name, signals[name], signal.values)
+            self._compare_resultant(name, signal.unit, signal.values)
         return ImpactRecord(
             recording=recording,
             metadata=self._metadata(),
@@ -112,6 +123,16 @@ class _Head:
         for channel in sorted(mine, key=lambda c: (not c.valid, not c.primary, c.curve)):
             best.setdefault(channel.axis, channel)
         return [best[axis] for axis in AXES if axis in best]
+
+    def _compare_resultant(self, signal: SignalName, unit: str, values: FloatArray) -> None:
+        """The resultant that the laboratory supplies, where it lets it stand, against that of the samples."""
+        for channel in self.test.channels:
+            is_its = (channel.occupant, channel.signal, channel.axis) == (self.occupant, signal, RESULTANT)
+            if is_its and channel.valid and channel.unit == unit and channel.curve in self.curves:
+                with suppress(Problem):  # the samples are whole without it
+                    reported = _columns(self.archive.read(self.curves[channel.curve]), channel)[1]
+                    if len(reported) == len(values):
+                        self.notes += check_reported_resultant(signal, unit, reported, values)
 
     def _curves_of(self, channels: list[Channel]) -> list[Curve]:
         """The signal's three curves, or none where one is absent; what its laboratory marked invalid is held."""

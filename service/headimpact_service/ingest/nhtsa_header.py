@@ -28,7 +28,8 @@ SOUND = frozenset({"", "AM", "CM", "LN", "SC"})
 _SECTION = re.compile(r"-{3,}\s*([A-Z0-9 ]+?)\s*-{3,}")
 _TEST_NUMBER = re.compile(r"#.*Test Number:\s*([0-9]{1,8})\s*$", re.MULTILINE)
 _SIGNALS: dict[str, SignalName] = {"AC": "linear_acceleration", "AV": "angular_velocity"}
-_AXES = {"XL": "x", "YL": "y", "ZL": "z"}
+RESULTANT = "resultant"
+_AXES = {"XL": "x", "YL": "y", "ZL": "z", "RS": RESULTANT}
 _UNITS = {"linear_acceleration": {"G'S": "g"}, "angular_velocity": {"DPS": "deg/s"}}
 _CHANNEL_FIELDS, _OCCUPANT_FIELDS = 19, 35
 
@@ -43,7 +44,7 @@ class Occupant:
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One head channel."""
+    """One head channel; its axis may be :data:`RESULTANT`."""
 
     occupant: Occupant
     signal: SignalName

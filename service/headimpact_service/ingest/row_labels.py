@@ -52,6 +52,10 @@ class RowLabels:
             return text
         return next(filter(None, self._distinct(column)), "")
 
+    def all_said(self, column: int) -> list[str]:
+        """What its rows say in a column, each once."""
+        return [self.said(column)] if self.alike else self._distinct(column)
+
     def require_one_impact(self, time_zone: str | None) -> None:
         """Refuse rows that say different things of their impact: they are several, and nothing tells them apart."""
         if self.alike:

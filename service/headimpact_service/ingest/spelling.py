@@ -22,7 +22,7 @@ def compact(heading: str) -> str:
 
 
 @cache
-def _vocabulary() -> dict[str, Any]:
+def vocabulary() -> dict[str, Any]:
     """The words of the generic preset."""
     found: dict[str, Any] = tomllib.loads(_PRESET.read_text("utf-8"))["vocabulary"]
     return found
@@ -33,7 +33,8 @@ def _units() -> dict[str, dict[str, str]]:
     """Of time and of each signal, every spelling of a unit, as :func:`compact` has it, and the unit."""
     return {
         quantity: {compact(spelling): unit for unit, spellings in said["units"].items() for spelling in spellings}
-        for quantity, said in _vocabulary().items()
+        for quantity, said in vocabulary().items()
+        if "units" in said
     }
 
 
@@ -51,8 +52,14 @@ def unit_spelled(signal: str, text: str | None) -> str | None:
 @cache
 def _written(quantity: str) -> tuple[tuple[str, str], ...]:
     """Spellings of a quantity's units as they are written, the longest first, each with its unit."""
-    units = _vocabulary()[quantity]["units"].items()
+    units = vocabulary()[quantity]["units"].items()
     return tuple(sorted(((text, unit) for unit, texts in units for text in texts), key=lambda said: -len(said[0])))
+
+
+def unit_ending(quantity: str, heading: str) -> str | None:
+    """The unit of a quantity that ends a heading as a word of its own."""
+    at_end = unit_at_end(quantity, heading)
+    return None if at_end is None else at_end[1]
 
 
 def unit_at_end(quantity: str, heading: str) -> tuple[str, str] | None:

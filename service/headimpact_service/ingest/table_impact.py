@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from headimpact.cut_offs import PAPER
-from headimpact.quality import QualityNote, check_reported_resultant
+from headimpact.quality import QualityNote, check_reported_peak, check_reported_resultant
 from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
@@ -33,6 +33,8 @@ from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
+from headimpact_service.ingest.supplied import peak_said
+from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, numbers_of
 
@@ -210,10 +212,20 @@ class TableImpact:
         values = self.samples.signals[track.name][track.rows].copy()
         if values.shape[0] > MAX_SAMPLES:
             raise file_fault(f"An impact may have at most {MAX_SAMPLES} samples.", "sample-count")
-        if layout.resultant is not None:
-            reported = self.samples.numbers[layout.resultant][track.rows]
-            self.notes += check_reported_resultant(track.name, layout.unit, reported, values)
+        self._compare(track, values)
         return Signal(values, layout.unit, *base, layout.full_scale)
+
+    def _compare(self, track: Track, values: FloatArray) -> None:
+        """The device's own resultants and peaks against those of its samples."""
+        layout = self.layout.signals[track.name]
+        for one in layout.resultants:
+            reported = self.samples.numbers[one.column][track.rows] * one.factor
+            reported[np.isinf(reported)] = np.nan  # a cell that is no number
+            self.notes += check_reported_resultant(track.name, layout.unit, reported, values)
+        for one in layout.peaks:
+            peak = peak_said(self.labels.all_said(one.column))
+            if peak is not None:
+                self.notes += check_reported_peak(track.name, layout.unit, peak * one.factor, values)
 
     def _text(self, column: int | None) -> str | None:
         if column is None:

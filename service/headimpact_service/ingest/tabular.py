@@ -40,6 +40,8 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     _require_no_other_rate(layout, plan, headings)
     if options.mapping is None or "time" not in options.mapping.model_fields_set:
         layout = layout.beside(headings, table.has_samples)
+    if plan.preset is not None:
+        layout = layout.comparing(headings, table.wordless, parted=table.parted)
     if not (table.parted or _names_one_impact(options)):
         layout = layout.watching(table.wordless)
     blocks = table.blocks(layout.numbers, layout.texts)
@@ -128,8 +130,7 @@ def _names_columns(mapping: Mapping) -> Iterator[str]:
         if value is None or (hasattr(value, "unit") and not (value.x or value.y or value.z)):
             continue
         yield name
-        if hasattr(value, "resultant") and value.resultant is not None:
-            yield f"{name}.resultant"
+        yield from (f"{name}.{kind}" for kind in ("resultant", "peak") if getattr(value, kind, None) is not None)
 
 
 def _require_rate(layout: Layout, plan: Plan) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from headimpact.recording import SignalName
-from headimpact_service.ingest.spelling import unit_at_end, unit_spelled
+from headimpact_service.ingest.spelling import unit_ending, unit_spelled
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _TIMES = frozenset({"t", "time", "times", "stamp", "timestamp", "timestamps", "elapsed", "zeit", "temps", "tiempo"})
@@ -28,8 +28,7 @@ def speaks_of_times(heading: str) -> bool:
 
 def unit_of_times(heading: str, beside: str | None) -> str | None:
     """The unit of the times that a column holds, as its heading and the unit beside it say; None where they do not."""
-    at_end = unit_at_end("time", heading)
-    unit = unit_spelled("time", beside) or (None if at_end is None else at_end[1])
+    unit = unit_spelled("time", beside) or unit_ending("time", heading)
     return unit if unit is not None and _words(heading) & _TIMES else None
 
 

@@ -325,3 +325,19 @@ def test_times_that_the_header_says_otherwise_are_noted_and_the_curves_own_count
     assert record.recording.pre_trigger_ms == 1.0
     assert {note.code for note in record.notes} == {"questionable_data"}
     assert all(said in note.detail for note in record.notes)
+
+
+def test_a_supplied_resultant_is_compared_with_the_three_axes():
+    resultant = np.linalg.norm([half_sine(40, float(number)) for number in (1, 2, 3)], axis=0)
+    header = ev5(*rows(), row(7, "AC", "RS"))
+
+    def notes(factor: float) -> list[str]:
+        told = "".join(f"{(i - 10) * 1e-4:.6f}\t{value:.6f}\n" for i, value in enumerate(factor * resultant))
+        return [note.code for note in one(zipped(files(header=header, **{"v10999/v10999.007": told}))).notes]
+
+    assert notes(1.0) == []
+    assert notes(1.2) == ["vendor_peak_mismatch"]
+    assert one(zipped(files(header=header))).notes == ()
+    assert one(zipped(files(header=header, **{"v10999/v10999.007": "no number"}))).notes == ()
+    of_another = ev5(*rows(), row(7, "AC", "RS", occupant="02"))
+    assert len(read(zipped(files(header=of_another)))) == 1

@@ -53,12 +53,12 @@ class ArrayTable:
 
     parted = True
     dated = frozenset[int]()
-    wordless = frozenset[int]()
 
     def __init__(self, samples: Sequence[Samples], facts: Sequence[Fact], units: dict[str, str]) -> None:
         """Samples with times first, so that a signal's own times stand before it; `units` by the array's name."""
         self._samples, self._facts = list(samples), list(facts)
         self._columns = [(array, part) for array in self._samples for part in range(array.width)]
+        self.wordless = range(len(self._columns))
         named = [heading for array in self._samples for heading in array.headings]
         self.headings = checked_headings([*named, *(fact.name for fact in self._facts)])
         self.units = {place: units[array.name] for place, (array, _) in enumerate(self._columns) if array.name in units}

@@ -27,7 +27,6 @@ class StructTable:
 
     parted = True
     dated = frozenset[int]()
-    wordless = frozenset[int]()
     units: dict[int, str] = {}  # noqa: RUF012 - a MATLAB file says none
 
     def __init__(self, impacts: Sequence[dict[str, Any]]) -> None:
@@ -43,6 +42,7 @@ class StructTable:
                 headings.append(heading)
                 self._columns.append((name, part))
         self.headings = checked_headings(headings)
+        self.wordless = [place for place, (_, part) in enumerate(self._columns) if part is not None]
 
     def has_samples(self, place: int) -> bool:
         """A field of columns does."""

@@ -226,9 +226,11 @@ def _columns_shown(preset: Preset) -> list[dict[str, Any]]:
         for axis in AXES
     ]
     columns += [
-        {"signal": signal, "axis": "resultant", "unit": signal_columns.unit, "headings": signal_columns.resultant}
+        {"signal": signal, "axis": kind, "unit": signal_columns.unit, "headings": named}
         for signal in SIGNALS
-        if (signal_columns := preset.mapping.columns_of(signal)) is not None and signal_columns.resultant
+        if (signal_columns := preset.mapping.columns_of(signal)) is not None
+        for kind, named in (("resultant", signal_columns.resultant), ("peak", signal_columns.peak))
+        if named
     ]
     if preset.vocabulary is not None:
         columns += [_vocabulary_shown(signal, preset.vocabulary[signal]) for signal in SIGNALS]
