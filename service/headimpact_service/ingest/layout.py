@@ -100,6 +100,12 @@ class Layout:
         one_each = (self.external_id, self.athlete, self.device, self.unscorable)
         return sorted({c for c in (*one_each, *self.keys, *self.context.values(), *reading) if c is not None})
 
+    def field_of(self, column: int) -> str | None:
+        """What a column is read as that a mapping may do without; None for those that tell impacts apart."""
+        named = {"external_id": self.external_id, "athlete": self.athlete, "device": self.device}
+        named["session_id"] = self.context.get("session_id")
+        return next((field for field, place in named.items() if place == column and column not in self.keys), None)
+
     @property
     def numbers(self) -> list[int]:
         """Columns that are read as numbers."""

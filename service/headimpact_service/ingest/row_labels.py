@@ -63,7 +63,7 @@ class RowLabels:
         self._require_unread_alike(time_zone)
         for column in self.layout.labels:
             if len([cell for cell in self._distinct(column) if cell]) > 1:
-                raise self._several(column, _SAY)
+                raise self._several(column, _SAY, self._or_unread(column))
         if any(len(self._distinct(column)) > 1 for column in self.layout.occurred_at):
             self._require_one_time(self.layout.occurred_at, time_zone)
         self._require_counted()
@@ -81,6 +81,14 @@ class RowLabels:
             for column in columns:
                 if tell(self._cells(column)):
                     raise self._several(column, what, _OR_ONE)
+
+    def _or_unread(self, column: int) -> str:
+        """How to leave a column alone that says nothing of the impact: a number of each row, say."""
+        field = self.layout.field_of(column)
+        if field is None:
+            return ""
+        alone = "" if self.layout.keys else ', "group_by": []'
+        return f'; if they are one, read no {field} from it ({{"{field}": null{alone}}} in a mapping)'
 
     def _require_counted(self) -> None:
         """Refuse samples that are left out, as numbers of them that are not read otherwise say."""
@@ -123,7 +131,7 @@ class RowLabels:
 
     def _several(self, column: int, what: str, otherwise: str = "") -> Problem:
         heading = self.layout.headings[column]
-        parting = f' (["{heading}"], if that tells them apart)' if heading else ""
+        parting = f' (["{heading}"], if that tells them apart)' if heading and what == _SAY else ""
         return file_fault(
             f"{self.layout.named(column)} {what} in all rows of the impact that begins in row {self.row + 1} below the "
             f"headings: if they are several impacts, tell them apart by a column impact_id or a mapping's group_by"

@@ -141,6 +141,19 @@ class TestContext:
         assert cell not in problem.detail
 
 
+class TestNames:
+    @pytest.mark.parametrize("heading", ["Player", "Player ID", "player_id", "Subject", "Subject ID", "athlete_id"])
+    def test_an_athlete_is_read_from_any_of_its_names(self, heading):
+        assert one(labelled(**{heading: "p-17"})).athlete_external_id == "p-17"
+
+    @pytest.mark.parametrize("heading", ["Device ID", "Serial Number", "sensor_id", "Device Serial Number", "device"])
+    def test_a_device_is_read_from_any_of_its_names(self, heading):
+        assert one(labelled(**{heading: "mg7"})).device_serial == "mg7"
+
+    def test_an_identifier_goes_before_a_name_of_the_same_person(self):
+        assert one(labelled(Player="Ann", player_id="p-17")).athlete_external_id == "p-17"
+
+
 class TestResultants:
     @pytest.mark.parametrize("name", ["prevent", "swa"])
     def test_a_device_s_own_resultants_are_compared(self, name):

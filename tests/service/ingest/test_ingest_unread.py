@@ -48,7 +48,7 @@ def shape(record: ImpactRecord) -> int:
         ("", [*range(SAMPLES)] * 3),
         ("trigger", each(1, 2, 3)),
         ("uuid", each("a3", "b7", "c1")),
-        ("Player", each("A", "B", "A")),
+        ("Wearer", each("A", "B", "A")),
         ("file name", each("a.csv", "b.csv", "c.csv")),
         ("Sample", [*range(SAMPLES)] * 3),
         ("Sample Number", [float(n) for n in range(SAMPLES)] * 3),
@@ -217,6 +217,24 @@ def test_samples_that_are_counted_anew_within_a_named_impact_are_several() -> No
         40,
         40,
     ]
+
+
+@pytest.mark.parametrize(
+    ("heading", "field"), [("Player", "athlete"), ("Device ID", "device"), ("session_id", "session_id")]
+)
+def test_rows_of_two_players_are_refused_unless_the_column_is_not_read(heading: str, field: str) -> None:
+    text = untimed(heading, each("A", "B", "A"))
+    problem = refused(text, sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "several-impacts")]
+    assert f'{{"{field}": null, "group_by": []}}' in problem.detail
+    unread = Mapping.model_validate({field: None, "group_by": []})
+    assert shape(one(text, sample_rate_hz=1000.0, mapping=unread)) == 3 * SAMPLES
+
+
+def test_a_number_of_each_row_is_no_device_where_the_sender_says_so() -> None:
+    text = untimed("impact_id,Serial Number", [f"1,{n}" for n in range(SAMPLES)], records=1)
+    assert '({"device": null} in a mapping)' in refused(text, sample_rate_hz=1000.0).detail
+    assert shape(one(text, sample_rate_hz=1000.0, mapping=Mapping(device=None))) == SAMPLES
 
 
 def test_times_that_go_on_are_of_one_person() -> None:
