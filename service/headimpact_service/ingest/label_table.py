@@ -13,7 +13,7 @@ from pydantic_core import to_json
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.file_faults import file_fault
-from headimpact_service.ingest.formula_cells import unguarded
+from headimpact_service.ingest.formula_cells import name_in, unguarded
 from headimpact_service.ingest.json_faults import parse
 from headimpact_service.ingest.text_facts import delimiter_of
 
@@ -85,7 +85,8 @@ def _line(index: int, header: Sequence[str], cells: Sequence[str], model: type[B
             "invalid-payload", f"The line has {len(cells)} cells where the table has {len(header)} columns."
         )
         return LabelLine(index, None, None, fault)
-    values = {name: unguarded(cell.strip()) for name, cell in zip(header, cells, strict=True)}
+    told = ((name, cell.strip()) for name, cell in zip(header, cells, strict=True))
+    values = {name: name_in(cell) if name in IMPACT else unguarded(cell) for name, cell in told}
     given = {name: cell for name, cell in values.items() if cell}
     impact_id, external_id = given.pop("impact_id", None), given.pop("external_id", None)
     if impact_id is None and external_id is None:

@@ -17,7 +17,7 @@ from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
-from headimpact_service.ingest.formula_cells import unguarded, unguarded_name
+from headimpact_service.ingest.formula_cells import name_in, unguarded, unguarded_name
 from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass, mounting
 from headimpact_service.ingest.impact_times import ImpactTimes
@@ -233,11 +233,17 @@ class TableImpact:
         text = self.labels.said(column)
         return (unguarded(text) if self.plan.format == "csv" else unguarded_name(text)) or None
 
+    def _named(self, column: int | None) -> str | None:
+        if column is None:
+            return None
+        return name_in(self.labels.said(column), typed=self.plan.format != "csv") or None
+
     def _name(self, field: str, column: int | None) -> str | None:
-        return checked_name(self._text(column), field)
+        return checked_name(self._named(column), field)
 
     def _context(self) -> dict[str, Any]:
-        cells = ((field, self._text(column)) for field, column in self.layout.context.items())
+        read = {"session_id": self._named}
+        cells = ((field, read.get(field, self._text)(column)) for field, column in self.layout.context.items())
         texts = tuple((field, text) for field, text in cells if text is not None)
         return dict(context_of(texts)) if texts else {}
 
@@ -249,7 +255,7 @@ class TableImpact:
 
     def _metadata(self) -> dict[str, Any]:
         told = {"format": self.plan.format, "preset": self.plan.preset, "file": self.options.filename}
-        keys = [self._text(column) for column in self.layout.keys if column != self.layout.external_id]
+        keys = [self._named(column) for column in self.layout.keys if column != self.layout.external_id]
         return {name: value for name, value in told.items() if value is not None} | self._told_apart(keys)
 
     def _told_apart(self, keys: list[str | None]) -> dict[str, Any]:

@@ -6,10 +6,12 @@ import json
 from datetime import UTC, datetime
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from binary_files import noise, parquet, wide, xlsx
 from hypothesis import given
 from hypothesis import strategies as st
-from ingest_files import codes, csv_text, one, read, refused, six_axis
+from ingest_files import GENERIC, codes, csv_text, one, read, refused, six_axis
 from making import MAKERS, columns, motion, resultant
 
 from headimpact.cut_offs import NO_FILTER
@@ -149,6 +151,33 @@ class TestNames:
     @pytest.mark.parametrize("heading", ["Device ID", "Serial Number", "sensor_id", "Device Serial Number", "device"])
     def test_a_device_is_read_from_any_of_its_names(self, heading):
         assert one(labelled(**{heading: "mg7"})).device_serial == "mg7"
+
+    @pytest.mark.parametrize("write", ["csv", "parquet", "parquet of text", "xlsx"])
+    def test_a_whole_number_that_a_data_frame_made_a_float_is_the_same_name_in_every_format(self, write):
+        names = {"external_id": 3.0, "athlete": 7.0, "device": 42.0, "session_id": 2026.0}
+        if write == "csv":
+            data: str | bytes = labelled(**{name: repr(number) for name, number in names.items()})
+        elif write == "xlsx":
+            rows = [[*names.values(), index / 1000, *row] for index, row in enumerate(six_axis().tolist())]
+            data = xlsx({"a": [[*names, *GENERIC.split(",")], *rows]})
+        else:
+            table = wide(noise(1)).drop_columns(["external_id"])
+            for name, number in names.items():
+                table = table.append_column(name, pa.array([repr(number) if "text" in write else number] * 40))
+            data = parquet(table)
+        record = one(data)
+        assert (record.external_id, record.athlete_external_id, record.device_serial) == ("3", "7", "42")
+        assert record.context["session_id"] == "2026"
+
+    @pytest.mark.parametrize("name", ["7.5", "007.0", "7.00", "v7.0", "-7.0", "1.0.0", "'quoted", ".0"])
+    def test_any_other_name_stays_as_it_is(self, name):
+        assert one(labelled(athlete=name)).athlete_external_id == name
+
+    def test_a_version_of_firmware_is_no_whole_number(self):
+        assert one(labelled(firmware="2.0")).context == {"firmware": "2.0"}
+
+    def test_an_apostrophe_before_it_keeps_a_name_that_looks_like_a_float(self):
+        assert one(labelled(athlete="'7.0")).athlete_external_id == "7.0"
 
     def test_an_identifier_goes_before_a_name_of_the_same_person(self):
         assert one(labelled(Player="Ann", player_id="p-17")).athlete_external_id == "p-17"

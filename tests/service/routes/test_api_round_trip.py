@@ -109,6 +109,9 @@ def variants() -> dict[str, dict[str, Any]]:
         "NA", scale=1.31, athlete={"external_id": "null"}, device={"serial": "-"}, context={"sport": "missing"}
     )
     bodies["quoted like nothing"] = impact_body("'nan", scale=1.32, athlete={"external_id": "."})
+    bodies["named like a float"] = impact_body(
+        "8.0", scale=1.33, athlete={"external_id": "7.0"}, device={"serial": "12.0"}, context={"session_id": "3.0"}
+    )
     bodies["rotation only"] |= {"external_id": "'=1+1", "athlete": {"external_id": "'quoted"}}
     bodies["linear only"]["context"] = {"session_id": "+s", "sport": "'@"}
     bodies["plain"]["device"] = {"serial": "mg-1"}

@@ -269,6 +269,11 @@ class TestTables:
         self.send(api, table)
         assert self.send(api, table).json()["summary"] == {"labelled": 0, "unchanged": 1, "failed": 0}
 
+    def test_a_name_that_a_data_frame_made_a_float_finds_its_impact(self, api: Api) -> None:
+        api.create("3")
+        found = self.send(api, "external_id,outcome,basis\n3.0,no_concussion,follow_up\n")
+        assert found.json()["summary"] == {"labelled": 1, "unchanged": 0, "failed": 0}
+
     def test_lines_that_contradict_each_other_are_both_refused(self, api: Api) -> None:
         impact = api.create("e-1")["id"]
         found = self.send(
