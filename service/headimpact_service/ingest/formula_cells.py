@@ -1,6 +1,6 @@
 """Cells whose text would be taken for something else: written with an apostrophe before them, read without it.
 
-A spreadsheet would run some as a formula; readers of tables, ours among them, take others for no value.
+A spreadsheet would run some as a formula; readers of tables, ours among them, take others for no value or for a number.
 """
 
 from __future__ import annotations

@@ -14,7 +14,15 @@ from headimpact_service.ingest.layout import Layout, lay_out
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.plan import Plan
-from headimpact_service.ingest.presets import Preset, beside_signals, preset_named, recognise, spoken_of
+from headimpact_service.ingest.presets import (
+    Preset,
+    beside_signals,
+    fitting,
+    preset_named,
+    recognise,
+    signals_of_presets,
+    spoken_of,
+)
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
 from headimpact_service.ingest.table import Table
@@ -34,8 +42,9 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     headings = Headings(table.headings, table.units, table.dated)
     plan = _plan(headings, options, format_name)
     _require_sensor(plan.mapping)
-    layout = lay_out(plan.mapping, headings, plan.required)
+    layout = _laid_out(plan, headings)
     _require_read(layout, headings, options)
+    _require_no_other_device(layout, plan, headings)
     _require_rate(layout, plan)
     _require_no_other_rate(layout, plan, headings)
     if options.mapping is None or "time" not in options.mapping.model_fields_set:
@@ -99,6 +108,19 @@ def _names_signals(mapping: Mapping) -> bool:
     return any(s is not None and (s.x or s.y or s.z) for s in signals)
 
 
+def _laid_out(plan: Plan, headings: Headings) -> Layout:
+    """The layout, or why there is none, with the preset whose columns these are unless one was named."""
+    try:
+        return lay_out(plan.mapping, headings, plan.required)
+    except Problem as problem:
+        names = [] if plan.options.preset is not None else fitting(headings, but=plan.preset)
+        if not names:
+            raise
+        detail = f"{problem.detail} The headings are those of the preset {' or '.join(names)}: name it beside the file."
+        [fault, *_] = problem.errors
+        raise layout_problem(detail, code=fault.code, pointer=fault.pointer) from None
+
+
 def _require_sensor(mapping: Mapping) -> None:
     """Refuse a mounting of signals that are said to be the head's: it would change nothing."""
     if mapping.mounting is not None and mapping.location != "sensor":
@@ -118,6 +140,22 @@ def _require_read(layout: Layout, headings: Headings, options: ImportOptions) ->
             raise layout_problem(
                 f"The columns {', '.join(columns)} seem to be the {words(signal)}, in a unit or for a device that is "
                 "not known: name the columns of every signal, and their units, in a mapping.",
+                code="columns-not-read",
+                pointer=f"/{signal}",
+            )
+
+
+def _require_no_other_device(layout: Layout, plan: Plan, headings: Headings) -> None:
+    """Refuse a signal that only another preset would read, unless a mapping says which columns are signals."""
+    if plan.options.mapping is not None and _names_signals(plan.options.mapping):
+        return
+    read = set(layout.numbers)
+    for preset, signal, columns in signals_of_presets(headings):
+        if signal not in layout.signals and read.isdisjoint(columns):
+            written = ", ".join(headings.written[column] for column in columns)
+            raise layout_problem(
+                f"The columns {written} are the {words(signal)} of the preset {preset} and would not be read: name it, "
+                "or the columns of every signal in a mapping.",
                 code="columns-not-read",
                 pointer=f"/{signal}",
             )

@@ -274,6 +274,22 @@ def test_a_biocore_file_has_no_units_in_it_and_is_read_only_by_name():
     assert peaks(recording.angular_acceleration) == [4.0, 5.0, 6.0]
 
 
+def test_the_preset_whose_columns_these_are_is_named_and_no_signal_of_it_is_passed_over():
+    text = table(PRESET_TABLES["biocore"])
+    assert "preset biocore" in refused(text).detail
+    units = {"angular_velocity": {"unit": "rad/s"}, "angular_acceleration": {"unit": "rad/s^2"}}
+    assert "preset biocore" in refused(text, mapping=mapping({"angular_velocity": {"unit": "rad/s"}})).detail
+    problem = refused(text, mapping=mapping(units))
+    assert codes(problem) == [("/linear_acceleration", "columns-not-read")]
+    assert "Ah_x, Ah_y, Ah_z" in problem.detail
+    assert "preset biocore" in problem.detail
+    assert (
+        "preset"
+        not in refused(text.replace("Ah_", "Bh_").replace("ALP", "XY")).detail.rpartition("nor in the preset")[2]
+    )
+    assert "preset imperial" in refused(table(PRESET_TABLES["imperial"])).detail
+
+
 def test_an_imperial_file_needs_its_units_beside_the_preset():
     text = table(PRESET_TABLES["imperial"])
     assert codes(refused(text, preset="imperial")) == [("/linear_acceleration/unit", "unit-missing")]

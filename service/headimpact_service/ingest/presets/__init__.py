@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Annotated, Any, Literal
@@ -161,6 +161,22 @@ def recognise(headings: Headings) -> Preset | None:
     """The preset that a table's headings are of."""
     candidates = (preset for preset in presets().values() if preset.recognised and preset.format == "table")
     return next((preset for preset in candidates if preset.fits(headings)), None)
+
+
+def fitting(headings: Headings, *, but: str | None) -> list[str]:
+    """The presets whose columns a table has all, `but` the one that it is read by and the generic ones."""
+    tables = (preset for preset in presets().values() if preset.format == "table" and preset.vocabulary is None)
+    return [preset.name for preset in tables if preset.name != but and preset.fits(headings)]
+
+
+def signals_of_presets(headings: Headings) -> Iterator[tuple[str, SignalName, list[int]]]:
+    """Where a table has the three columns of a signal of a preset: the preset's name, the signal, and the columns."""
+    for preset in presets().values():
+        for name in SIGNALS if preset.format == "table" and preset.vocabulary is None else ():
+            columns = preset.mapping.columns_of(name)
+            if columns is not None and _is_there(columns, headings):
+                places = (headings.find(getattr(columns, axis)) for axis in AXES)
+                yield preset.name, name, [place for place in places if place is not None]
 
 
 def list_presets() -> list[dict[str, Any]]:
