@@ -137,10 +137,10 @@ class ImpactTimes:
     def require_no_other(self, tracks: list[Track], labels: RowLabels) -> None:
         """Refuse times and rates beside those that are read at which no signal is: one signal's may be among them."""
         rates = [rate for track in tracks if (rate := track.samples_per_s) is not None]
-        for rate_column in self.layout.others.rates:
-            said = number_said(labels.said(rate_column.column))
-            if said is not None and not _is_among(said, rates, OTHER_CLOCK):
-                raise _other(rate_column.heading, said)
+        for other_rate in self.layout.others.rates:
+            said = number_said(labels.said(other_rate.column))
+            if said is not None and not _is_among(said * other_rate.hertz, rates, OTHER_CLOCK):
+                raise _other(other_rate.heading, said * other_rate.hertz)
         for other in self.layout.others.clocks:
             self._require_among(other.column, other.milliseconds, other.heading, rates)
         shared = self.clock

@@ -24,10 +24,11 @@ class OtherClock:
 
 @dataclass(frozen=True, slots=True)
 class OtherRate:
-    """A column of samples per second that no signal is read by."""
+    """A column of samples per second, or of so many, that no signal is read by."""
 
     column: int
     heading: str
+    hertz: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,5 +63,5 @@ def other_times(headings: Headings, read: Collection[int], has_samples: Callable
         if unit is not None and has_samples(column):
             clocks.append(OtherClock(column, heading, TIME_UNITS[unit]))
         elif any(name in compact(heading) for name in _RATES):
-            rates.append(OtherRate(column, heading))
+            rates.append(OtherRate(column, heading, 1000.0 if "khz" in compact(heading) else 1.0))
     return OtherTimes(tuple(clocks), tuple(rates))

@@ -122,6 +122,16 @@ def test_a_rate_at_which_no_signal_is_read_is_refused(heading: str):
     assert rates(one(with_rate(2000), mapping=own)) == [1000.0, 2000.0]
 
 
+@pytest.mark.parametrize(("said", "code"), [("1", None), ("2", "rate-differs"), ("", None), ("fast", None)])
+def test_a_rate_may_be_in_kilohertz_or_no_number(said: str, code: str | None):
+    rows = [[n, *row, said] for n, row in enumerate(six_axis().tolist())]
+    text = table(["t_ms", *SIX, "Sampling rate [kHz]"], rows)
+    if code is None:
+        assert rates(one(text)) == [1000.0, 1000.0]
+    else:
+        assert codes(refused(text)) == [("sample_rate_hz", code)]
+
+
 def test_rates_of_each_sensor_in_a_row_an_impact_are_not_mixed_up():
     lists = dict(zip(SIX, ([column.tolist()] for column in six_axis().T), strict=True))
     columns: dict[str, Any] = {"sample_rate_hz": [1600.0], "gyro_sample_rate_hz": [2000.0]} | lists
