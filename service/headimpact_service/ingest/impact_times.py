@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
 
-from headimpact.quality import QualityNote
+from headimpact.quality import QualityNote, words
 from headimpact.recording import SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import number_said
@@ -157,6 +157,21 @@ class ImpactTimes:
         said = 1000.0 * (stamps.size - 1) / span
         if not _is_among(said, rates, OTHER_CLOCK + rounded_to(stamps) / span):
             raise _other(heading, said)
+
+    def require_going_on(self, track: Track, parting: Callable[[], str]) -> None:
+        """Refuse times that begin anew: the rows are of several impacts; `parting` says what may tell them apart."""
+        stamps = track.stamps
+        if stamps is None or track.rate is not None or self.samples.window.columns.lengths is not None:
+            return
+        steps = np.diff(stamps)
+        falls = np.flatnonzero(steps < 0)
+        if falls.size and stamps[falls[0] + 1] <= stamps[0] + np.nanmedian(np.abs(steps)):
+            raise file_fault(
+                f"The times of the {words(track.name)} begin anew at sample {falls[0] + 1} of the impact that begins "
+                f"in row {self.row + 1} below the headings: if they are several impacts, tell them apart by a column "
+                f"impact_id or a mapping's group_by{parting()}.",
+                "several-impacts",
+            )
 
     def require_times(self, track: Track) -> None:
         """Refuse a missing time."""

@@ -82,6 +82,15 @@ class RowLabels:
                 if tell(self._cells(column)):
                     raise self._several(column, what, _OR_ONE)
 
+    def parting(self) -> str:
+        """How a mapping may part the rows: by the first column that is not read and says different things in them."""
+        found = (column for column in self.layout.unread.hints if are_several(self._cells(column)))
+        return next((self._by(column) for column in found), "")
+
+    def _by(self, column: int) -> str:
+        heading = self.layout.headings[column]
+        return f' (["{heading}"], if that tells them apart)' if heading else ""
+
     def _or_unread(self, column: int) -> str:
         """How to leave a column alone that says nothing of the impact: a number of each row, say."""
         field = self.layout.field_of(column)
@@ -130,8 +139,7 @@ class RowLabels:
             raise self._several(columns[0], _TIME)
 
     def _several(self, column: int, what: str, otherwise: str = "") -> Problem:
-        heading = self.layout.headings[column]
-        parting = f' (["{heading}"], if that tells them apart)' if heading and what == _SAY else ""
+        parting = self._by(column) if what == _SAY else ""
         return file_fault(
             f"{self.layout.named(column)} {what} in all rows of the impact that begins in row {self.row + 1} below the "
             f"headings: if they are several impacts, tell them apart by a column impact_id or a mapping's group_by"

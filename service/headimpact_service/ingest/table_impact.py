@@ -107,6 +107,8 @@ class TableImpact:
         self.times.require_counted(allow_gaps=fill_gaps)
         self.notes += self.times.other_origins()
         tracks = self._tracks()
+        for track in tracks:
+            self.times.require_going_on(track, self.labels.parting)
         self.times.require_no_other(tracks, self.labels)
         # The signals before the drop say when the record began, those after it when what is kept begins.
         kept = [self._without_first(track) for track in tracks]

@@ -173,10 +173,14 @@ def _names_columns(mapping: Mapping) -> Iterator[str]:
 
 def _require_rate(layout: Layout, plan: Plan) -> None:
     stated = plan.options.sample_rate_hz is not None or plan.mapping.sample_rate_hz is not None
-    said = stated or layout.clock is not None or "sample_rate_hz" in layout.reading
-    if not said and any(signal.clock is None and signal.sample_rate_hz is None for signal in layout.signals.values()):
+    if stated or layout.clock is not None or "sample_rate_hz" in layout.reading:
+        return
+    without = [words(name) for name, signal in layout.signals.items() if not signal.is_apart]
+    if without:
+        whose = "The file has" if len(without) == len(layout.signals) else f"The {' and the '.join(without)} has"
         raise file_fault(
-            "The file has no column of times that is known: give its sample rate.",
+            f"{whose} no column of times that is known: give the sample rate, or name the times in a mapping, for all "
+            'signals ({"time": {"column": "t", "unit": "ms"}}) or within a signal for that one.',
             "rate-missing",
             parameter="sample_rate_hz",
         )

@@ -69,11 +69,18 @@ class Unread:
     counters: tuple[int, ...] = ()
     others: tuple[int, ...] = ()
     marks: tuple[int, ...] = ()
+    hints: tuple[int, ...] = ()
+    """Names that tell nothing where samples have times, but how to part the rows if these begin anew."""
+
+    @property
+    def watched(self) -> tuple[int, ...]:
+        """Those that must say the same, or count on, within an impact."""
+        return (*self.names, *self.times, *self.counters, *self.others, *self.marks)
 
     @property
     def columns(self) -> tuple[int, ...]:
         """All of them."""
-        return (*self.names, *self.times, *self.counters, *self.others, *self.marks)
+        return (*self.watched, *self.hints)
 
 
 NOTHING_UNREAD = Unread()
@@ -109,6 +116,8 @@ def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> st
         return "marks" if alone else None
     if words & telling:
         return "names"
+    if words & (_NAMES | _PARTS):
+        return "hints"
     return "others" if alone else None
 
 

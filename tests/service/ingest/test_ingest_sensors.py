@@ -115,7 +115,11 @@ class TestOwnTimes:
 
     def test_a_signal_without_times_or_rate_beside_one_that_has_them_is_refused(self):
         own = mapping(linear_acceleration=ACCELERATION | {"sample_rate_hz": 1600})
-        assert codes(refused(table(SIX, six_axis().tolist()), mapping=own)) == [("sample_rate_hz", "rate-missing")]
+        problem = refused(table(SIX, six_axis().tolist()), mapping=own)
+        assert codes(problem) == [("sample_rate_hz", "rate-missing")]
+        assert problem.detail.startswith("The angular velocity has no column of times")
+        neither = mapping(linear_acceleration=ACCELERATION, angular_velocity=VELOCITY)
+        assert refused(table(SIX, six_axis().tolist()), mapping=neither).detail.startswith("The file has no column of")
 
     @pytest.mark.parametrize(
         ("rate", "stamps", "said"),

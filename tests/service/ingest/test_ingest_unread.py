@@ -243,3 +243,24 @@ def test_times_that_go_on_are_of_one_person() -> None:
     assert codes(refused("\n".join([f"Player,{first}", *told]))) == [(None, "several-impacts")]
     marked = [f"{int(number == 9)},{line}" for number, line in enumerate(lines)]
     assert shape(one("\n".join([f"Event,{first}", *marked]))) == SAMPLES
+
+
+@pytest.mark.parametrize("heading", ["Impact", "Event", "Trial", "filename", "case", "impact_no"])
+def test_times_that_begin_anew_name_the_column_that_parts_them(heading: str) -> None:
+    first, *lines = csv_text(six_axis(SAMPLES)).splitlines()
+    told = [f"{name},{line}" for name in ("a1", "a2", "a3") for line in lines]
+    problem = refused("\n".join([f"{heading},{first}", *told]))
+    assert codes(problem) == [(None, "several-impacts")]
+    assert f"begin anew at sample {SAMPLES} " in problem.detail
+    assert f'group_by (["{heading}"]' in problem.detail
+    found = read("\n".join([f"{heading},{first}", *told]), mapping=Mapping(group_by=[heading]))
+    assert [shape(record) for record in found] == [SAMPLES] * 3
+
+
+def test_times_that_begin_anew_beside_nothing_that_parts_them_say_so_too() -> None:
+    first, *lines = csv_text(six_axis(SAMPLES)).splitlines()
+    problem = refused("\n".join([first, *lines, *lines]))
+    assert codes(problem) == [(None, "several-impacts")]
+    assert problem.detail.endswith("by a column impact_id or a mapping's group_by.")
+    lists = "\n".join([first, *lines[:20], lines[18], *lines[20:]])  # one time that goes back is no other impact
+    assert shape(one(lists)) == SAMPLES + 1
