@@ -33,15 +33,15 @@ def _missing_values(values: FloatArray) -> tuple[FloatArray, int]:
         return values, 0
     filled, index = values.copy(), np.arange(values.shape[0])
     for axis in range(values.shape[1]):
-        short = _short_runs(unknown[:, axis])
+        short = short_runs(unknown[:, axis])
         known = ~unknown[:, axis]
         if short.any():
             filled[short, axis] = np.interp(index[short], index[known], values[known, axis])
     return filled, int(np.count_nonzero((unknown & np.isfinite(filled)).any(axis=1)))
 
 
-def _short_runs(unknown: BoolArray) -> BoolArray:
-    """Which of the unknown lie in a run that is short and has a known neighbour on either side."""
+def short_runs(unknown: BoolArray) -> BoolArray:
+    """Which of the unknown lie in a run that can be filled: it is short and has a known neighbour on either side."""
     short = np.zeros_like(unknown)
     edges = np.flatnonzero(np.diff(unknown.astype(np.int8), prepend=0, append=0))
     for start, stop in zip(edges[::2], edges[1::2], strict=True):

@@ -14,6 +14,7 @@ from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, check_cut, head_recording
 from headimpact_service.ingest.file_faults import file_fault
+from headimpact_service.ingest.filling import how_filled
 from headimpact_service.ingest.impact_reading import low_pass
 from headimpact_service.ingest.iso_codes import RESULTANT, HeadCode
 from headimpact_service.ingest.options import ImportOptions
@@ -146,7 +147,8 @@ class _Head:
         for curve in curves:
             missing = np.flatnonzero(np.isnan(curve.values))
             if missing.size:
-                detail = f"The {words(signal)} {curve.axis} has no value at sample {missing[0]}."
+                helps = how_filled(curve.values, int(missing[0]))
+                detail = f"The {words(signal)} {curve.axis} has no value at sample {missing[0]}{helps}."
                 raise file_fault(detail, "missing-sample")
 
     def _compare_resultant(self, signal: SignalName, unit: str, values: np.ndarray[Any, np.dtype[np.float64]]) -> None:

@@ -24,6 +24,7 @@ from headimpact.recording import (
 from headimpact.risk import OperatingPointRequest
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
 from headimpact_service.ingest import impact_rules
+from headimpact_service.ingest.filling import FILLED
 from headimpact_service.ingest.impact_json import (
     AthleteRef,
     FilterBody,
@@ -124,7 +125,7 @@ def _require_whole(sent: Recording, what: str) -> None:
         if isnan(signal.values.sum()):
             for axis, index in np.argwhere(np.isnan(signal.values.T)).tolist():
                 place = f"/kinematics/{name}/{AXES[axis]}/{index}"
-                errors.append(PayloadError(detail="A number is needed.", code="wrong-type", pointer=place))
+                errors.append(PayloadError(detail=f"A number is needed; {FILLED}.", code="wrong-type", pointer=place))
     if errors:
         raise rules_problem(errors[:MAX_ERRORS], what=what, count=len(errors))
 

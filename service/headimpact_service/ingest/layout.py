@@ -110,13 +110,17 @@ class Layout:
     def numbers(self) -> list[int]:
         """Columns that are read as numbers."""
         signals = self.signals.values()
-        all_clocks = (*self.clocks, *(signal.clock for signal in signals))
-        clocks = [clock.column for clock in all_clocks if clock is not None]
         resultants = [one.column for signal in signals for one in signal.resultants]
         counted = [] if self.sample_number is None else [self.sample_number]
         others = [clock.column for clock in self.others.clocks]
         components = (column for signal in signals for column in signal.columns)
-        return sorted({*clocks, *resultants, *counted, *others, *components})
+        return sorted({*self.stamps, *resultants, *counted, *others, *components})
+
+    @property
+    def stamps(self) -> list[int]:
+        """Columns of stamps that signals are read by."""
+        all_clocks = (*self.clocks, *(signal.clock for signal in self.signals.values()))
+        return [clock.column for clock in all_clocks if clock is not None]
 
     @property
     def texts(self) -> list[int]:

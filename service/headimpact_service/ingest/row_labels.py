@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from headimpact.published import QUALITY_LIMITS
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
+from headimpact_service.ingest.filling import MOST
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.unread import (
     are_several,
@@ -107,11 +107,10 @@ class RowLabels:
                 raise self._counted(column, *hole)
 
     def _counted(self, column: int, before: float, after: float, step: float) -> Problem:
-        heading, most = self.layout.headings[column], QUALITY_LIMITS["gaps"]["maximum_samples"]
+        heading = self.layout.headings[column]
         filled = (
-            f', or name the column in a mapping ({{"sample_number": "{heading}"}}) and ask for fill_gaps, which fills '
-            f"gaps of at most {most} samples"
-            if step == 1.0 and after - before <= most + 1
+            f', or name the column in a mapping ({{"sample_number": "{heading}"}}) and ask for fill_gaps'
+            if step == 1.0 and after - before <= MOST + 1
             else ""
         )
         return file_fault(

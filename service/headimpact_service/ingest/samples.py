@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from headimpact_service.ingest.file_faults import file_fault
+from headimpact_service.ingest.filling import how_filled
 from headimpact_service.ingest.layout import Layout, SignalLayout
 from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns, FloatArray
@@ -47,11 +48,13 @@ class Samples:
         if self.is_whole:
             return
         for column in columns:
-            faulty = np.flatnonzero(~np.isfinite(self.numbers[column][rows]))
+            numbers = self.numbers[column][rows]
+            faulty = np.flatnonzero(~np.isfinite(numbers))
             if faulty.size:
+                helps = "" if column in self.layout.stamps else how_filled(numbers, int(faulty[0]))
                 raise file_fault(
-                    f"A cell of column {column + 1} is not {needed}, at sample {faulty[0]} of the impact that "
-                    f"begins in row {first + 1} below the headings.",
+                    f"{self.layout.named(column)} has a cell that is not {needed}, at sample {faulty[0]} of the "
+                    f"impact that begins in row {first + 1} below the headings{helps}.",
                     "missing-sample",
                 )
 

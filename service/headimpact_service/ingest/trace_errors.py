@@ -9,6 +9,7 @@ from headimpact.errors import TraceError
 from headimpact.record_rules import broken_rules
 from headimpact.recording import Recording
 from headimpact_service.errors import MAX_ERRORS, PayloadError, Problem
+from headimpact_service.ingest.filling import FILLED, would_be_whole
 
 # Codes whose index counts stamps rather than samples of a channel.
 _TIME_CODES = frozenset({"time-not-increasing", "time-jitter"})
@@ -21,8 +22,11 @@ def trace_problem(error: TraceError, recording: Recording) -> Problem:
     """
     faults = {(fault.code, _pointer(fault)): str(fault) for fault in (error, *_first(broken_rules(recording)))}
     errors = [PayloadError(detail=detail, code=code, pointer=place) for (code, place), detail in faults.items()]
+    detail = str(error)
+    if would_be_whole(recording, error.code):
+        detail = f"{detail.removesuffix('.')}; {FILLED}."
     slug = "improper-rotation" if error.code == "improper-rotation" else "invalid-trace"
-    return Problem(slug, str(error), errors=errors[:MAX_ERRORS])
+    return Problem(slug, detail, errors=errors[:MAX_ERRORS])
 
 
 def _first(faults: Iterator[TraceError]) -> Iterator[TraceError]:

@@ -104,7 +104,8 @@ def test_a_bad_cell_is_the_fault_of_its_own_impact(cell: str):
     assert isinstance(bad, RefusedImpact)
     assert bad.external_id == "b"
     assert (bad.slug, bad.errors[0].code) == ("unreadable-file", "missing-sample")
-    assert "column 4" in bad.detail
+    assert "Column 4 (ay_g)" in bad.detail
+    assert ("fill_gaps" in bad.detail) is (cell.lower() in {"", "nan"})
     assert "sample 4" in bad.detail
     assert "row 41" in bad.detail
 
@@ -330,3 +331,37 @@ def test_whatever_numbers_are_written_come_back(values: list[list[float]], quote
     samples = np.array(values)
     labels = {"label": '"x"'} if quote else None
     np.testing.assert_array_equal(samples_of(one(csv_text(samples, before=labels))), samples)
+
+
+@pytest.mark.parametrize(("samples", "helps"), [((7,), "fill_gaps"), ((7, 8), "fill_gaps"), ((7, 8, 9), ".")])
+def test_a_gap_names_what_helps_against_it(samples: tuple[int, ...], helps: str):
+    lines = csv_text().splitlines()
+    for sample in samples:
+        lines[sample + 1] = ",".join([lines[sample + 1].split(",")[0], *[""] * 6])
+    problem = refused("\n".join(lines))
+    assert codes(problem) == [(None, "missing-sample")]
+    assert helps in problem.detail.partition("headings")[2]
+    assert ("fill_gaps" in problem.detail) is (helps == "fill_gaps")
+    if helps == "fill_gaps":
+        assert one("\n".join(lines), fill_gaps=True).recording.fill_gaps
+
+
+@pytest.mark.parametrize("samples", [range(5), range(35, 40), range(39, 40)])
+def test_a_signal_that_is_shorter_than_its_rows_is_told_to_be_cut(samples: range):
+    lines = csv_text().splitlines()
+    for sample in samples:
+        lines[sample + 1] = ",".join([*lines[sample + 1].split(",")[:4], *[""] * 3])
+    problem = refused("\n".join(lines))
+    assert codes(problem) == [(None, "missing-sample")]
+    assert problem.detail.endswith(": leave out the samples at the record's edge that lack it.")
+    assert "(wx_rad_s)" in problem.detail
+    kept = [line for number, line in enumerate(lines) if number - 1 not in samples]
+    assert one("\n".join(kept)).recording.angular_velocity is not None
+
+
+def test_a_time_that_is_missing_is_none_that_can_be_filled():
+    lines = csv_text().splitlines()
+    lines[8] = ",".join(["", *lines[8].split(",")[1:]])
+    problem = refused("\n".join(lines))
+    assert "Column 1 (t_s)" in problem.detail
+    assert "fill_gaps" not in problem.detail

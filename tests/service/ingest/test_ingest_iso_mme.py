@@ -224,7 +224,9 @@ class TestMissing:
         held = channels() | {AX: channel(AX, "g", [*wave[:20], "NOVALUE", *wave[21:]])}
         problem = refused(iso_mme(held))
         assert codes(problem) == [(None, "missing-sample")]
-        assert "linear acceleration x has no value at sample 20" in problem.detail
+        assert problem.detail == (
+            "The linear acceleration x has no value at sample 20: fill_gaps fills gaps of at most 2 samples."
+        )
 
     def test_novalue_is_filled_where_that_is_asked_for(self):
         wave = [*half_sine(SAMPLES, 30.0).tolist()]

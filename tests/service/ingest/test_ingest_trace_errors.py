@@ -90,3 +90,25 @@ def test_an_improper_rotation_has_its_own_problem():
     problem = trace_problem(TraceError("improper-rotation", "The rotation."), Recording())
     assert problem.slug == "improper-rotation"
     assert codes(problem) == [("/kinematics/mounting", "improper-rotation")]
+
+
+def test_a_lost_sample_is_told_with_what_fills_it_where_that_helps():
+    lost = np.delete(six_axis(), 20, axis=0)[:, 3:]
+    one_lost = {"angular_velocity": signal("rad/s", lost, time_ms=[*STEADY[:20], *STEADY[21:]])}
+    problem = refusal(**one_lost)
+    assert codes(problem) == [(f"{TIMES}/20", "time-jitter")]
+    assert problem.detail.endswith("; fill_gaps fills gaps of at most 2 samples.")
+    prepare(read_impact(encoded(body(kinematics=kinematics(six_axis(), **one_lost, fill_gaps=True)))).recording)
+    many = signal("rad/s", six_axis()[:, 3:], time_ms=[*STEADY[:20], *(stamp + 3 for stamp in STEADY[20:])])
+    assert "fill_gaps" not in refusal(angular_velocity=many).detail
+    jitter = signal("rad/s", six_axis()[:, 3:], time_ms=[0.0, 0.5, *STEADY[2:]])
+    assert "fill_gaps" not in refusal(angular_velocity=jitter).detail
+    assert "fill_gaps" not in refusal(angular_velocity=jitter, fill_gaps=True).detail
+
+
+def test_null_among_samples_names_what_fills_it():
+    missing = kinematics(six_axis())
+    missing["angular_velocity"]["y"][7] = None
+    with pytest.raises(Problem) as caught:
+        read_impact(encoded(body(kinematics=missing)))
+    assert caught.value.errors[0].detail == "A number is needed; fill_gaps fills gaps of at most 2 samples."
