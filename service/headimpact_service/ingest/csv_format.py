@@ -22,7 +22,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import LineCells, is_no_number
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
 from headimpact_service.ingest.decimal_commas import MIXED, has_comma
-from headimpact_service.ingest.heading_rows import LOOK, top_of
+from headimpact_service.ingest.heading_rows import LOOK, cells_of, joined, top_of
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
@@ -71,13 +71,14 @@ class CsvTable:
         self._begun, self._empty_rows = False, 0
         self._joined = False
         self._ends: list[int] = []  # the line that each row of a block ends in
-        heading, has_units = self._find_headings(skip_rows)
+        above, heading, has_units = self._find_headings(skip_rows)
         self._delimiter = delimiter_of(heading)
         self._decimal_mark = ""
         self._decimal_commas = text.has_decimal_commas(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
-        self.headings: tuple[str, ...] = tuple(self._rows(reader, 1)[0])
-        self._repeated = [heading.strip() for heading in self.headings]
+        headings = self._rows(reader, 1)[0]
+        self.headings: tuple[str, ...] = tuple(joined(cells_of(above, self._delimiter), headings))
+        self._repeated = [heading.strip() for heading in headings]
         self.units: Mapping[int, str] = self._read_units(reader) if has_units else {}
         self._simply_quoted = _simply_quoted(self._delimiter)
         self.dated, self._elapsed = self._find_dated(), Elapsed()
@@ -99,14 +100,15 @@ class CsvTable:
                 joined=self._joined,
             )
 
-    def _find_headings(self, skip_rows: int) -> tuple[str, bool]:
-        """The line of headings, and whether units follow it; the lines above it are gone."""
+    def _find_headings(self, skip_rows: int) -> tuple[str, str, bool]:
+        """The line above the headings, these, and whether units follow them; the lines further above are gone."""
         first = self._first_line(skip_rows)
         ahead = [first, *islice(self._lines, LOOK)]
         top = top_of(ahead, search=not skip_rows)
         self._lines = chain(ahead[top.heading + 1 :], self._lines)
         self._line += top.heading
-        return self._whole(ahead[top.heading]), top.has_units
+        above = ahead[top.heading - 1] if top.heading else ""
+        return above, self._whole(ahead[top.heading]), top.has_units
 
     def _whole(self, line: str) -> str:
         """A line with those on which a quoted cell of it goes on."""

@@ -1,18 +1,22 @@
-"""Which of the rows at a table's top are its headings, and which below them are units."""
+"""Which of the rows at a table's top are its headings, which above them go on in these, and which below are units."""
 
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
+from headimpact.recording import AXES, SIGNALS
 from headimpact_service.ingest.cells import is_written_number
-from headimpact_service.ingest.spelling import compact, known_units
+from headimpact_service.ingest.spelling import compact, known_units, unit_ending
 from headimpact_service.ingest.text_facts import DELIMITERS
 
 LOOK = 60
 """Lines among which a table begins."""
 MAX_UNIT = 16
+_AXIS = re.compile(r"[\s_-]*axis", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,43 @@ def are_units(headings: Sequence[str], cells: Sequence[str]) -> bool:
     return known >= 2 and 2 * known >= len(told) and all(len(cell.strip()) <= MAX_UNIT for cell in told)
 
 
+def joined(upper: Sequence[str], headings: Sequence[str]) -> list[str]:
+    """The headings with what stands once above several of them, as merged cells are saved.
+
+    A quantity stands above its axes, with its unit or beside another quantity's; any other row above headings is none
+    of theirs.
+    """
+    above = [cell.strip() for cell in [*upper, *[""] * len(headings)][: len(headings)]]
+    over: list[str] = list(accumulate(above, _or_before))
+    axes = [place for place, heading in enumerate(headings) if over[place] and _is_axis(heading)]
+    quantities = {over[place] for place in axes}
+    if len(axes) < len(AXES) or (len(quantities) < 2 and not all(map(_ends_in_unit, quantities))):
+        return list(headings)
+    alone = (_with_own(own, heading.strip()) for own, heading in zip(above, headings, strict=True))
+    return [f"{over[at]} {_AXIS.sub('', headings[at])}" if at in axes else whole for at, whole in enumerate(alone)]
+
+
+def _or_before(before: str, cell: str) -> str:
+    return cell or before
+
+
+def _is_axis(heading: str) -> bool:
+    """Whether a heading is an axis and nothing else, but for its unit."""
+    name = compact(heading)
+    return name[:1] in AXES and name[1:].removeprefix("axis") in {"", *known_units()}
+
+
+def _ends_in_unit(heading: str) -> bool:
+    return any(unit_ending(signal, heading) for signal in SIGNALS)
+
+
+def _with_own(above: str, heading: str) -> str:
+    """A heading with the cell right above it, where it says nothing itself, or a unit only."""
+    if compact(heading) not in {"", *known_units()}:
+        return heading
+    return above if compact(above).endswith(compact(heading)) else f"{above} {heading}".strip()
+
+
 def top_of(lines: Sequence[str], *, search: bool) -> Top:
     """Where the headings stand among the first lines of a text, of which the first is none of its comments.
 
@@ -42,7 +83,7 @@ def top_of(lines: Sequence[str], *, search: bool) -> Top:
     if found is None:
         return Top(0, has_units=False)
     numbers, delimiter = found
-    rows = [_cells(line, delimiter) for line in lines[: numbers + 1]]
+    rows = [cells_of(line, delimiter) for line in lines[: numbers + 1]]
     heading = _heading(rows) if search else 0
     below = heading + 1
     return Top(heading, below < numbers and are_units(rows[heading], rows[below]))
@@ -53,9 +94,9 @@ def _first_numbers(lines: Sequence[str]) -> tuple[int, str] | None:
     for place, line in enumerate(lines):
         if '"' in line and line.count('"') % 2:
             return None  # a cell in quotes goes on in the next line
-        counts = {delimiter: sum(map(is_written_number, _cells(line, delimiter))) for delimiter in DELIMITERS}
+        counts = {delimiter: sum(map(is_written_number, cells_of(line, delimiter))) for delimiter in DELIMITERS}
         best = max(counts, key=lambda delimiter: counts[delimiter])
-        if place and counts[best] >= 2 and 2 * counts[best] >= len(_filled(_cells(line, best))):
+        if place and counts[best] >= 2 and 2 * counts[best] >= len(_filled(cells_of(line, best))):
             return place, best
     return None
 
@@ -79,7 +120,8 @@ def _filled(cells: Sequence[str]) -> list[str]:
     return [cell for cell in cells if cell.strip()]
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """The cells of a line that stands alone."""
     try:
         return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter), [])
     except csv.Error:

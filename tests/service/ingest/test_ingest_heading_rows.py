@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from binary_files import xlsx
 from ingest_files import GENERIC, codes, csv_text, one, read, refused, six_axis
 
 from headimpact.preparation import prepare
@@ -41,6 +42,37 @@ class TestTop:
         expected = one(csv_text())
         assert np.array_equal(samples_of(record), samples_of(expected))
         assert record.recording.angular_velocity.unit == "rad/s"
+
+    @pytest.mark.parametrize(
+        "rows",
+        [
+            ("Time (s),Linear acceleration (g),,,Angular velocity (rad/s),,", ",x,y,z,x,y,z"),
+            (",Linear acceleration (g),,,Angular velocity (rad/s),,", "Time (s),x,y,z,x,y,z"),
+            ("Time (s),Linear acceleration,,,Angular velocity,,", ",x (g),y (g),z (g),x (rad/s),y (rad/s),z (rad/s)"),
+            ("Time,Linear acceleration,,,Angular velocity,,", "s,X [g],Y [g],Z [g],X [rad/s],Y [rad/s],Z [rad/s]"),
+            ("Time,Linear acceleration,,,Angular velocity,,", ",x,y,z,x,y,z", UNITS),
+            (
+                "My recording,,,,,,",
+                "Time (s),Linear acceleration (g),,,Angular velocity (rad/s),,",
+                ",X axis,Y axis,Z axis,x,y,z",
+            ),
+        ],
+    )
+    def test_a_quantity_that_stands_once_above_its_axes_is_each_one_s(self, rows):
+        expected = samples_of(one(csv_text()))
+        assert np.array_equal(samples_of(one(with_rows(*rows))), expected)
+        cells = [[cell or None for cell in row.split(",")] for row in rows]
+        samples = [[index / 1000, *row] for index, row in enumerate(six_axis().tolist())]
+        assert np.array_equal(samples_of(one(xlsx({"a": [*cells, *samples]}))), expected)
+
+    @pytest.mark.parametrize("above", ["Export of sensor 7,,,,,,", "Export,,,left,,,", "a,b,c,d,e,f,g"])
+    def test_any_other_row_above_the_headings_is_none_of_theirs(self, above):
+        columns = {"unit": "g", "x": "x", "y": "y", "z": "z"}
+        mapping = Mapping.model_validate({"linear_acceleration": columns, "time": {"column": "Time (s)", "unit": "s"}})
+        text = with_rows(above, "Time (s),x,y,z,other,another,third")
+        assert one(text, mapping=mapping.model_copy(update={"skip_rows": 1})).recording.linear_acceleration is not None
+        if above.startswith("Export of"):
+            assert one(text, mapping=mapping).recording.linear_acceleration is not None
 
     def test_units_in_both_places_are_said_twice(self):
         assert samples_of(one(with_rows(GENERIC, UNITS))).shape == (40, 6)

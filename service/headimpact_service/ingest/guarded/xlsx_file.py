@@ -26,7 +26,7 @@ from headimpact_service.ingest.guarded.contents import (
     checked_text,
     unreadable,
 )
-from headimpact_service.ingest.heading_rows import are_units
+from headimpact_service.ingest.heading_rows import are_units, joined
 from headimpact_service.ingest.spelling import known_units
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
@@ -148,32 +148,32 @@ class SheetTable:
 def _blocks(sheet: CalamineSheet) -> list[_Block]:
     """Rows below the headings they belong to; rows without a number are words between them."""
     blocks: list[_Block] = []
-    above: Row = []
-    before: Row = []
+    above: list[Row] = [[], [], []]
     empty: list[Row] = []
     for row in sheet.iter_rows():
         if blocks and _holds_nothing(row):
             empty.append(row)
             continue
         if _has_number(row):
-            block = _begun(above, before)
+            block = _begun(*above)
             if block is not None and sum(_says_number(row[column]) for column in block.columns) > 1:
                 blocks.append(block)
                 empty = []
             if blocks:
                 blocks[-1].rows += [*empty, row]
                 empty = []
-        above, before = before, row
+        above = [*above[1:], row]
     return blocks
 
 
-def _begun(above: Row, before: Row) -> _Block | None:
+def _begun(top: Row, above: Row, before: Row) -> _Block | None:
     """The block whose headings are the row before its numbers, or the one above that where it is a row of units."""
     has_units = bool(_named_columns(above)) and are_units(list(map(_word, above)), list(map(_word, before)))
-    headings, units = (above, before) if has_units else (before, [])
-    columns = _named_columns(headings)
-    if len(columns) < 2:
+    upper, named, units = (top, above, before) if has_units else (above, before, [])
+    if len(_named_columns(named)) < 2:
         return None
+    headings = joined([] if _has_number(upper) else list(map(_word, upper)), list(map(_word, named)))
+    columns = _named_columns(headings)
     said = [_word(units[column]) if column < len(units) else "" for column in columns]
     return _Block(columns, [headings[column].strip() for column in columns], said)
 
@@ -192,14 +192,14 @@ def _holds_nothing(row: Row) -> bool:
     return all(cell is None or (isinstance(cell, str) and not said(cell)) for cell in row)
 
 
-def _named_columns(row: Row) -> list[int]:
+def _named_columns(row: Sequence[Any]) -> list[int]:
     """The columns of a row that may be headings: words only."""
     if _has_number(row):
         return []
     return [column for column, cell in enumerate(row) if isinstance(cell, str) and cell.strip()]
 
 
-def _has_number(row: Row) -> bool:
+def _has_number(row: Sequence[Any]) -> bool:
     """Whether a row holds a number, or more than one that is kept as text."""
     return any(map(_is_number, row)) or sum(map(_says_number, row)) > 1
 
