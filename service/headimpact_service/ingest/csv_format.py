@@ -21,7 +21,16 @@ import numpy as np
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import LineCells, is_no_number
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
-from headimpact_service.ingest.decimal_commas import MIXED, has_comma
+from headimpact_service.ingest.decimal_commas import (
+    GROUPED,
+    MIXED,
+    UNCLEAR_COMMA,
+    UNCLEAR_POINT,
+    groups_thousands,
+    has_comma,
+    has_decimal_comma,
+    may_group_by_point,
+)
 from headimpact_service.ingest.heading_rows import LOOK, cells_of, joined, top_of
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
@@ -75,6 +84,7 @@ class CsvTable:
         self._delimiter = delimiter_of(heading)
         self._decimal_mark = ""
         self._decimal_commas = text.has_decimal_commas(self._delimiter)
+        self._decimal_points = text.has_decimal_points(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
         headings = self._rows(reader, 1)[0]
         self.headings: tuple[str, ...] = tuple(joined(cells_of(above, self._delimiter), headings))
@@ -157,7 +167,7 @@ class CsvTable:
 
     def _fast(self, lines: list[str], numbers: Sequence[int], texts: Sequence[int]) -> Block | None:
         """A block in which a line is a row, by NumPy's own reader; None where a line is not as plain as that."""
-        if self._decimal_commas:
+        if self._decimal_commas or not self._decimal_points:
             return None
         if self._quoted:
             lines = [self._simply_quoted.sub(r"\1", line) if '"' in line else line for line in lines]
@@ -233,17 +243,27 @@ class CsvTable:
         """The number in a cell; NaN where there is none, infinite where something else stands."""
         comma = _NUMBER.fullmatch(cell) is None
         if comma and not has_comma(cell):
+            if groups_thousands(cell):
+                raise unreadable(GROUPED)
             return float("nan" if is_no_number(cell) else "inf")
         if comma and not self._decimal_commas:
-            return self._unclear(
-                "Whether commas in the file's numbers are decimal or group thousands is not clear: write them with a "
-                "decimal point."
-            )
-        if self._decimal_commas and (comma or "." in cell):
-            mark = "," if comma else "."
+            if has_decimal_comma(cell):
+                return self._unclear(UNCLEAR_COMMA)
+            raise unreadable(UNCLEAR_COMMA)
+        if comma or "." in cell:
+            return self._of_mark(cell, "," if comma else ".")
+        return float(cell)
+
+    def _of_mark(self, cell: str, mark: str) -> float:
+        """A number with a decimal mark, of which a file has one."""
+        if self._decimal_commas:
             self._decimal_mark = self._decimal_mark or mark
             if mark != self._decimal_mark:
                 return self._unclear(MIXED)
+        elif not self._decimal_points:
+            if may_group_by_point(cell):
+                raise unreadable(UNCLEAR_POINT)
+            self._decimal_points = True
         return float(cell.replace(",", "."))
 
     def _unclear(self, detail: str) -> float:

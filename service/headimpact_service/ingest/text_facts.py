@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.decimal_commas import CLEAR
+from headimpact_service.ingest.decimal_commas import CLEAR, CLEAR_POINT
 
 MAX_LINE = 256 * 1024
 UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
@@ -17,6 +17,7 @@ UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 DELIMITERS = (",", ";", "\t")
 _BARE = re.compile(rf"(?:^|[;\t\r\n]){CLEAR}(?=[;\t\r\n]|$)".encode())
+_POINT = re.compile(rf"(?:^|[;\t\r\n\"]){CLEAR_POINT}(?=[;\t\r\n\"]|$)".encode())
 _IN_QUOTES = re.compile(f'"{CLEAR}"'.encode())
 
 
@@ -35,6 +36,10 @@ class TextFacts:
         """
         patterns = (_IN_QUOTES,) if delimiter == "," else (_BARE, _IN_QUOTES)
         return any(pattern.search(self.head) for pattern in patterns)
+
+    def has_decimal_points(self, delimiter: str) -> bool:
+        """Whether points in its numbers are decimal: between commas, or where one of them groups no thousands."""
+        return delimiter == "," or _POINT.search(self.head) is not None
 
 
 def text_facts(stream: BinaryIO) -> TextFacts:

@@ -80,3 +80,36 @@ def test_quotes_hold_decimal_commas_between_commas():
     quoted = [re.sub(r";", ",", re.sub(r"(?<=;)12,5", '"12,5"', text)) for text in (in_csv("12,5"), in_dts("12,5"))]
     assert sample(one(quoted[0]), "angular_velocity") == 12.5
     assert sample(one(quoted[1]), "linear_acceleration") == 12.5
+
+
+POINTED = ["1.250", "-12.345", "+999.000", " 7.125"]
+
+
+@pytest.mark.parametrize("cell", POINTED)
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_a_point_that_may_group_thousands_is_refused_among_whole_numbers(cell: str, delimiter: str):
+    problem = refused(in_csv(cell).replace(";", delimiter))
+    assert "Whether points in the file's numbers are decimal or group thousands" in problem.detail
+    assert "without separators of thousands" in problem.detail
+
+
+@pytest.mark.parametrize("cell", POINTED)
+@pytest.mark.parametrize("clear", ["0.125", "12.5", "1234.567", "1.2040", "1.250e1", ".5"])
+def test_one_clear_point_tells_of_those_that_might_group_thousands(cell: str, clear: str):
+    assert sample(one(in_csv(cell, clear)), "angular_velocity") == float(cell)
+
+
+def test_points_between_commas_are_decimal():
+    assert sample(one(in_csv("1.250").replace(";", ",")), "angular_velocity") == 1.25
+
+
+@pytest.mark.parametrize("cell", ["1,204.5", "1.204,5", "-1,204,567", "1.204.567", "12,345,678.9"])
+@pytest.mark.parametrize("delimiter", [";", ","])
+def test_grouped_thousands_are_refused_with_what_to_do(cell: str, delimiter: str):
+    text = in_csv(f'"{cell}"').replace(";", delimiter)
+    assert "groups its thousands" in refused(text).detail
+
+
+def test_a_comma_in_quotes_that_may_group_thousands_is_refused_with_what_to_do():
+    assert "without separators of thousands" in refused(in_csv('"1,204"').replace(";", ",")).detail
+    assert "no separators of thousands" in refused(in_csv("12,5", "1.204")).detail

@@ -51,11 +51,8 @@ class TestTop:
             ("Time (s),Linear acceleration,,,Angular velocity,,", ",x (g),y (g),z (g),x (rad/s),y (rad/s),z (rad/s)"),
             ("Time,Linear acceleration,,,Angular velocity,,", "s,X [g],Y [g],Z [g],X [rad/s],Y [rad/s],Z [rad/s]"),
             ("Time,Linear acceleration,,,Angular velocity,,", ",x,y,z,x,y,z", UNITS),
-            (
-                "My recording,,,,,,",
-                "Time (s),Linear acceleration (g),,,Angular velocity (rad/s),,",
-                ",X axis,Y axis,Z axis,x,y,z",
-            ),
+            ("Time (s),Linear acceleration (g),,,Angular velocity (rad/s),,", "s,X axis,Y-axis,Z_axis,x,y,z"),
+            ("Mine,,,,,,", "Time (s),Linear acceleration (g),,,Angular velocity (rad/s),,", ",x,y,z,x,y,z"),
         ],
     )
     def test_a_quantity_that_stands_once_above_its_axes_is_each_one_s(self, rows):
