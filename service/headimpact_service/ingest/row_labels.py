@@ -16,8 +16,8 @@ from headimpact_service.ingest.unread import (
     begins_anew,
     left_out,
     lie_apart,
-    lie_in_blocks,
     longest_s,
+    mark_blocks,
     moment_of,
     span_s,
     tell_parts,
@@ -76,7 +76,7 @@ class RowLabels:
             (unread.times, partial(lie_apart, time_zone=time_zone), _TIME),
             (unread.counters, begins_anew, _COUNT),
             (unread.others, tell_parts, _SAY),
-            (unread.marks, partial(lie_in_blocks, marks=True), _SAY),
+            (unread.marks, mark_blocks, _SAY),
         ):
             for column in columns:
                 if tell(self._cells(column)):

@@ -8,7 +8,7 @@ A mapping's empty ``group_by`` says that all rows are one impact.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby, pairwise
@@ -43,7 +43,9 @@ _MEASURED = frozenset(
     }
 )
 """Words of what is measured, whatever it is of: a sensor's temperature."""
-_MARKS = frozenset({"is", "flag", "trigger", "triggered", "active", "state", "status", "error"})
+_MARKS = frozenset(
+    {"is", "flag", "trigger", "triggered", "active", "state", "status", "error", "phase", "stage", "mode"}
+)
 """Words of what comes and goes within an impact: an event's flag."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
@@ -122,8 +124,10 @@ def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> st
 
 
 def begins_anew(cells: Sequence[str]) -> bool:
-    """Whether numbers of samples stand still or go back to one that was before."""
+    """Whether numbers of samples stand still or go back to one that was before, or are names that stay for many."""
     told = _numbers(cells)
+    if not told:
+        return lie_in_blocks(cells)
     return any(after <= before for before, after in pairwise(told)) and len(set(told)) > 1
 
 
@@ -156,7 +160,7 @@ def left_out(cells: Sequence[str]) -> tuple[float, float, float] | None:
 
 def tell_parts(cells: Sequence[str]) -> bool:
     """Whether a column parts its rows as impacts are parted, whatever it is called: in blocks, or counting anew."""
-    return lie_in_blocks(cells) or _counts_anew(cells)
+    return lie_in_blocks(cells) or _count_up(_blocks(cells)) or _counts_anew(cells)
 
 
 def _counts_anew(cells: Sequence[str]) -> bool:
@@ -166,20 +170,32 @@ def _counts_anew(cells: Sequence[str]) -> bool:
     return bool(again.any() and 3 * again.sum() <= again.size and (np.array(told)[1:][again] == told[0]).all())
 
 
-def lie_in_blocks(cells: Sequence[str], *, marks: bool = False) -> bool:
-    """Whether every value has rows of its own that follow each other, and two have as many, as numbers of impacts do.
+def lie_in_blocks(cells: Sequence[str]) -> bool:
+    """Whether every value has rows of its own that follow each other, and two have as many, as names of impacts do."""
+    lengths = _blocks(cells)
+    return len(set(lengths.values())) < len(lengths)
 
-    Of `marks`, yes and no are none.
-    """
+
+def mark_blocks(cells: Sequence[str]) -> bool:
+    """The same of a column of marks, of which yes and no are none."""
+    return {word.lower() for word in _blocks(cells)} not in _YES_OR_NO and lie_in_blocks(cells)
+
+
+def _blocks(cells: Sequence[str]) -> dict[str, int]:
+    """How many rows each value has, where they follow each other; none where a value comes back or is measured."""
     lengths: dict[str, int] = {}
     for text, run in groupby(map(said, cells)):
         length = sum(1 for _ in run)
         if length < SHORTEST or not text or text in lengths or _WITH_PARTS.fullmatch(text):
-            return False
+            return {}
         lengths[text] = length
-    if marks and {word.lower() for word in lengths} in _YES_OR_NO:
-        return False
-    return len(set(lengths.values())) < len(lengths)
+    return lengths
+
+
+def _count_up(blocks: Mapping[str, int]) -> bool:
+    """Whether three values or more count up one by one, each for many rows, however many these are."""
+    told = _numbers(list(blocks))
+    return len(told) == len(blocks) > 2 and min(blocks.values()) >= STAY and set(np.diff(told)) == {1.0}
 
 
 def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:

@@ -44,6 +44,8 @@ def shape(record: ImpactRecord) -> int:
             for name in ("k", "label", "Auswahl")
             for names in ((7, 8, 9), ("c", "a", "b"), (0, 1, 2))
         ),
+        ("k", [7] * 50 + [8] * 40 + [9] * 30),
+        ("index", each("a", "b", "c")),
         ("n", [*range(SAMPLES)] * 3),
         ("", [*range(SAMPLES)] * 3),
         ("trigger", each(1, 2, 3)),
@@ -97,6 +99,8 @@ def test_rows_that_an_unread_column_tells_apart_are_refused(heading: str, cells:
         ("Sensor Saturated", [int(n > 9) for n in range(SAMPLES)]),
         ("phase", ["pre"] * 10 + ["impact"] * 12 + ["post"] * 18),
         ("label", ["pre"] * 10 + ["impact"] * 20 + ["pre"] * 10),
+        ("phase", [0] * 10 + [1] * 12 + [2] * 18),
+        ("k", [0] * 10 + [1] * 30),
         ("status", [0] * 20 + [1] * 20),
         ("triggered", ["no"] * 20 + ["yes"] * 20),
         ("heart rate", [72] * 40),
