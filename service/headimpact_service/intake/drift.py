@@ -28,7 +28,8 @@ def _in_order_of_time(selected: Selected) -> list[tuple[LabelledImpact, float]]:
 def drift_document(selected: Selected, active: RiskModel, tau: float | None) -> dict[str, Any] | None:
     """Observed against expected, a chart of the odds, and shifts between devices; None where nothing can be said.
 
-    In a case-control sample the level is that of the sample: the chart then looks for changes within it.
+    The level of a case-control sample is its own share of concussions: the chart then looks for changes within it.
+    A full follow-up is held against what the model says as it is, at the model's own incidence.
     """
     if REFERENCE not in active.curves:
         return None
@@ -43,8 +44,9 @@ def drift_document(selected: Selected, active: RiskModel, tau: float | None) -> 
     curve = active.curves[REFERENCE]
     x = np.array([values for values, _, _ in rows], dtype=np.float64)
     eta = -(curve.b0 + active.incidence_shift(tau) + x @ np.array(curve.b))
+    share = float(y.mean())
     if tau is not None:
-        eta = eta + prior_offset(float(y.mean()), tau)
+        eta = eta + prior_offset(share, tau)
     p = expit(eta)
     chart = risk_adjusted_cusum(y, p)
     shifts = group_shifts(eta, [device.strip() or "unknown" for _, _, device in rows])
@@ -53,6 +55,9 @@ def drift_document(selected: Selected, active: RiskModel, tau: float | None) -> 
         "criterion": REFERENCE,
         "observed": float(y.sum()),
         "expected": float(p.sum()),
+        "expected_at": {"level": "model", "incidence": active.incidence}
+        if tau is None
+        else {"level": "cohort", "incidence": share},
         "cusum": {
             "odds_ratio": chart.odds_ratio,
             "limit": chart.limit,

@@ -116,6 +116,23 @@ class TestFit:
         assert api.get("/v1/models/aliases/candidate").json()["version"] == "spring"
         assert api.get("/v1/models/aliases/active").json()["version"] == "laksari-2020"
 
+    @pytest.mark.parametrize(
+        ("sampling", "level", "told"),
+        [
+            ("full_follow_up", "model", "by its own probabilities, at its own incidence of 0.00550"),
+            ("case_control", "cohort", "if its incidence is set to the sample's share of concussions"),
+        ],
+    )
+    def test_the_page_says_at_which_level_concussions_are_expected(
+        self, api: Api, database: Database, mine: bytes, do: Do, sampling: str, level: str, told: str
+    ) -> None:
+        fill(database, mine)
+        do(order(api, sampling=sampling))
+        drift = api.get("/v1/models/spring/report").json()["drift"]
+        assert drift["expected_at"]["level"] == level
+        page = api.get("/v1/models/spring/report", headers={"accept": "text/html"}).text
+        assert told in page
+
     def test_the_export_fed_to_the_command_line_gives_the_same_model(
         self, api: Api, database: Database, mine: bytes, do: Do, tmp_path: Path
     ) -> None:
