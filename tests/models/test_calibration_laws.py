@@ -424,6 +424,8 @@ class TestCohorts:
             ({"bias_correction": "much"}, "bias-correction"),
             ({"incidence": 1.0}, "incidence"),
             ({"incidence_range": (0.5, 0.1)}, "incidence-range"),
+            ({"incidence": 0.1, "incidence_range": (0.001, 0.02)}, "incidence-range"),
+            ({"incidence_range": (0.01, 0.02)}, "incidence-range"),
             ({"replicas": -1}, "replicas"),
             ({"sensitivity_targets": (0.0,)}, "sensitivity"),
             ({"level": 1.0}, "level"),

@@ -18,6 +18,22 @@ BIAS_CORRECTIONS: tuple[BiasCorrection, ...] = ("king_zeng", "firth", "zelig", "
 MAX_REPLICAS = 10_000
 
 
+def require_in_range(incidence: float, bounds: Sequence[float]) -> None:
+    """Refuse a range of incidences that does not hold the one that intercepts are corrected to.
+
+    Raises
+    ------
+    CalibrationError
+        With the incidence, which is the bound of either end.
+    """
+    if not bounds[0] <= incidence <= bounds[1]:
+        raise CalibrationError(
+            "incidence-range",
+            f"The incidence_range must hold the incidence, {incidence:.15g}: its first number is at most that, its "
+            "second at least.",
+        )
+
+
 @dataclass(frozen=True)
 class RefitOptions:
     """What a refit is asked to do.
@@ -32,7 +48,7 @@ class RefitOptions:
     incidence
         tau, concussions per impact in the population of a case-control sample; the published model's unless given.
     incidence_range
-        The least and the greatest that it may be, for the range that leaves the intercept.
+        The least and the greatest that it may be, for the range that leaves the intercept; it lies between them.
     bias_correction
         ``king_zeng``, ``firth``, ``zelig`` (reproduces the paper) or ``none``.
     replicas
@@ -81,6 +97,8 @@ class RefitOptions:
             raise CalibrationError("incidence", "An incidence must be above 0 and below 1.")
         if self.incidence_range is not None and not 0.0 < self.incidence_range[0] <= self.incidence_range[1] < 1.0:
             raise CalibrationError("incidence-range", "A range of incidences rises from above 0 to below 1.")
+        if self.incidence_range is not None and self.tau is not None:
+            require_in_range(self.tau, self.incidence_range)
         if not 0 <= self.replicas <= MAX_REPLICAS:
             raise CalibrationError("replicas", f"Replicas are 0 to {MAX_REPLICAS}.")
         if not self.sensitivity_targets or not all(0.0 < target <= 1.0 for target in self.sensitivity_targets):

@@ -7,7 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from headimpact.criteria import CRITERION_KEYS
+from headimpact.errors import CalibrationError
+from headimpact_service.errors import PayloadError
 from headimpact_service.ingest.impact_json import CriterionKey, Incidence, Moment, Strict, Text, Word
+from headimpact_service.ingest.json_faults import rules_problem
 from headimpact_service.intake.scoring import Terms
 
 MAX_REPLICAS = 10_000
@@ -71,7 +74,9 @@ class FitBody(Strict):
         "`full_follow_up` they do not, and an incidence has no effect.",
     )
     incidence: Incidence | None = Field(default=None, description="What GET /v1/settings shows unless given.")
-    incidence_range: IncidenceRange | None = None
+    incidence_range: IncidenceRange | None = Field(
+        default=None, description="The least and the greatest that the incidence may be; it lies between them."
+    )
     bias_correction: Literal["king_zeng", "firth", "zelig", "none"] = "king_zeng"
     replicas: Annotated[int, Field(ge=0, le=MAX_REPLICAS)] = 1000
     folds: Annotated[int, Field(ge=2, le=100)] = 5
@@ -80,13 +85,6 @@ class FitBody(Strict):
         Field(default=[0.5, 0.9])
     )
     title: Text | None = None
-
-    @model_validator(mode="after")
-    def _incidence_is_in_its_range(self) -> FitBody:
-        bounds = self.incidence_range
-        if self.incidence is not None and bounds is not None and not bounds[0] <= self.incidence <= bounds[1]:
-            raise ValueError("An incidence lies within its incidence_range.")
-        return self
 
 
 def _coefficient(name: str) -> str:
@@ -134,9 +132,26 @@ class GatesBody(Strict):
     )
 
 
-def stored(body: FitBody, terms: Terms) -> dict[str, Any]:
-    """A fit as jobs and schedules keep it: JSON, complete, with the incidence that holds now."""
+def stored(body: FitBody, terms: Terms, place: str = "") -> dict[str, Any]:
+    """A fit as jobs and schedules keep it: JSON, complete, with the incidence that holds now.
+
+    Raises
+    ------
+    Problem
+        The range of incidences, a member of the object at `place`, does not hold that incidence.
+    """
     document = body.model_dump(mode="json", exclude_none=True)
     if body.sampling == "case_control":
-        document.setdefault("incidence", terms.incidence or terms.model.incidence)
+        incidence = document.setdefault("incidence", terms.incidence or terms.model.incidence)
+        if body.incidence_range is not None:
+            _require_in_range(incidence, body.incidence_range, f"{place}/incidence_range")
     return document
+
+
+def _require_in_range(incidence: float, bounds: list[float], place: str) -> None:
+    from headimpact.calibration.options import require_in_range  # as above
+
+    try:
+        require_in_range(incidence, bounds)
+    except CalibrationError as error:
+        raise rules_problem([PayloadError(str(error), "out-of-range", pointer=place)]) from None

@@ -157,7 +157,7 @@ async def put_schedule(call: Call) -> Response:
         cron=body.cron,
         time_zone=body.time_zone,
         enabled=body.enabled,
-        fit=stored(body.fit, (await call.renewed()).terms),
+        fit=stored(body.fit, (await call.renewed()).terms, "/fit"),
         gates=body.gates.model_dump(mode="json"),
         promote=body.promote,
     )

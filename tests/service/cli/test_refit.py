@@ -314,6 +314,13 @@ class TestTables:
         found = json.loads((tmp_path / "out/report.json").read_text())
         assert found["options"]["incidence_range"] == [0.001, 0.02]
 
+    def test_a_range_of_incidences_that_does_not_hold_the_incidence_is_refused(self, tmp_path: Path, run: Run) -> None:
+        write(tmp_path / "t.csv", simulated())
+        arguments = ("--replicas", "0", "--incidence", "0.1", "--incidence-range", "0.001", "0.02")
+        code, _, error = run("refit", "--table", "t.csv", "--out", "out", *arguments)
+        assert code == 2
+        assert "The incidence_range must hold the incidence, 0.1" in " ".join(error.split())
+
     def test_one_athlete_gives_a_fit_without_figures_by_athlete(self, tmp_path: Path, run: Run) -> None:
         columns = simulated() | {"athlete_id": ["a"] * 120}
         write(tmp_path / "t.csv", columns)

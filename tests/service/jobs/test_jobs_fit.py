@@ -246,6 +246,22 @@ class TestFit:
         assert "an impact was" in done["problem"]["detail"]
         assert api.get("/v1/models/spring").status_code == 404
 
+    def test_a_range_of_incidences_holds_the_one_that_is_served(self, api: Api) -> None:
+        asked = QUICK | {"incidence_range": [0.001, 0.02]}
+        assert api.post("/v1/models/fits", json=asked).status_code == 202
+        api.patch("/v1/settings", json={"incidence": 0.1})
+        refused = api.post("/v1/models/fits", json=asked)
+        assert refused.status_code == 422
+        assert refused.json()["errors"] == [
+            {
+                "pointer": "/incidence_range",
+                "code": "out-of-range",
+                "detail": "The incidence_range must hold the incidence, 0.1: its first number is at most that, its "
+                "second at least.",
+            }
+        ]
+        assert api.post("/v1/models/fits", json=asked | {"sampling": "full_follow_up"}).status_code == 202
+
     def test_one_idempotency_key_makes_one_job(self, api: Api) -> None:
         headers = {"idempotency-key": "monday"}
         first, again = (api.post("/v1/models/fits", json=QUICK, headers=headers).json() for _ in range(2))
@@ -261,7 +277,8 @@ class TestFit:
             ({"criteria": []}, "/criteria"),
             ({"incidence": 0}, "/incidence"),
             ({"incidence_range": [0.5, 0.1]}, "/incidence_range"),
-            ({"incidence": 0.5, "incidence_range": [0.001, 0.01]}, ""),
+            ({"incidence": 0.5, "incidence_range": [0.001, 0.01]}, "/incidence_range"),
+            ({"incidence_range": [0.01, 0.02]}, "/incidence_range"),
             ({"cohort": {"occurred_from": "2026-10-01T00:00:00Z", "occurred_to": "2026-09-01T00:00:00Z"}}, "/cohort"),
             ({"replicas": 10001}, "/replicas"),
             ({"folds": 1}, "/folds"),
@@ -510,6 +527,7 @@ class TestSchedules:
             ({"time_zone": "Mars/Olympus"}, "/time_zone"),
             ({"gates": {"min_events": 0}}, "/gates/min_events"),
             ({"fit": {"version": "x"}}, "/fit/version"),
+            ({"fit": {"incidence": 0.1, "incidence_range": [0.001, 0.02]}}, "/fit/incidence_range"),
             ({"fit": {"criteria": ["bam"]}, "gates": {"criteria": ["hic15"]}}, "/gates"),
             ({"gates": {"calibration_slope": [2, 1]}}, "/gates/calibration_slope"),
             ({"gates": {"expected_over_observed": [1.25, 0.8]}}, "/gates/expected_over_observed"),
