@@ -163,7 +163,8 @@ class ImpactTimes:
         stamps = track.stamps
         if stamps is None or track.rate is not None or self.samples.window.columns.lengths is not None:
             return
-        steps = np.diff(stamps)
+        with np.errstate(invalid="ignore"):  # from infinite to infinite
+            steps = np.diff(stamps)
         falls = np.flatnonzero(steps < 0)
         if falls.size and stamps[falls[0] + 1] <= stamps[0] + np.nanmedian(np.abs(steps)):
             raise file_fault(

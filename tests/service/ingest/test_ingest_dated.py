@@ -134,7 +134,7 @@ def test_a_cell_that_is_no_time_is_named(write: Writer, cell: str):
     times[20] = cell
     problem = refused(write(columns(times)))
     assert codes(problem) == [(None, "missing-sample")]
-    assert "column 1 is not a time with its date, at sample 20" in problem.detail
+    assert "Column 1 (timestamp) has a cell that is not a time with its date, at sample 20" in problem.detail
 
 
 @every_table

@@ -181,3 +181,9 @@ def test_rates_of_both_sensors_that_the_shared_times_gainsay_are_refused():
     assert rates(one(text, mapping=Mapping.model_validate(own | {"time": None}))) == [2000.0, 2000.0]
     own["angular_velocity"]["sample_rate_hz"] = 1000
     assert rates(one(text, mapping=Mapping.model_validate(own))) == [2000.0, 1000.0]
+
+
+@pytest.mark.parametrize("stamp", ["inf", "-inf", "1e400"])
+def test_times_that_run_to_infinity_are_a_fault_of_the_impact(stamp: str):
+    rows = [[stamp if n in {20, 21} else n, *row] for n, row in enumerate(six_axis().tolist())]
+    assert codes(refused(table(["t_ms", *SIX], rows))) == [(None, "missing-sample")]
