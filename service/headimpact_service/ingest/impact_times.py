@@ -165,7 +165,7 @@ class ImpactTimes:
             return
         with np.errstate(invalid="ignore"):  # from infinite to infinite
             steps = np.diff(stamps)
-        falls = np.flatnonzero(steps < 0)
+        falls = np.flatnonzero((steps < 0) & np.isfinite(steps))
         if falls.size and stamps[falls[0] + 1] <= stamps[0] + np.nanmedian(np.abs(steps)):
             raise file_fault(
                 f"The times of the {words(track.name)} begin anew at sample {falls[0] + 1} of the impact that begins "
