@@ -10,7 +10,7 @@ from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest import mapping as mappings
 from headimpact_service.ingest.file_faults import file_fault
-from headimpact_service.ingest.spelling import MAX_COMPACT, compact, unit_at_end
+from headimpact_service.ingest.spelling import MAX_COMPACT, compact, unit_at_end, unit_ending, unit_spelled
 from headimpact_service.ingest.time_headings import sensor_of_times, unit_of_times
 
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
@@ -36,6 +36,16 @@ class Headings:
     def spoken(self) -> list[str]:
         """The headings, each with the unit that stands beside it in the file, unless it ends in that itself."""
         return [_with_unit(heading, self.units.get(place, "")) for place, heading in enumerate(self.written)]
+
+    def units_beside(self, quantity: str, columns: Sequence[int]) -> set[str]:
+        """The units of a quantity that stand beside some columns, as far as they are known."""
+        told = (self.units.get(column) for column in columns)
+        return {unit for text in told if (unit := unit_spelled(quantity, text)) is not None}
+
+    def name_units(self, quantity: str, columns: Sequence[int]) -> bool:
+        """Whether units of a quantity stand beside some columns, or in their headings."""
+        written = (unit_ending(quantity, self.written[column]) for column in columns)
+        return bool(self.units_beside(quantity, columns)) or any(written)
 
     def find(self, spellings: Sequence[str]) -> int | None:
         """The column that one of the spellings names; a heading as written wins over a looser match.

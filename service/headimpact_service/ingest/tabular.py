@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 from headimpact.quality import words
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.beside import with_other_times, with_supplied, with_unread
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.file_names import named_facts
 from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
-from headimpact_service.ingest.layout import Layout, lay_out
+from headimpact_service.ingest.laying_out import lay_out
+from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.plan import Plan
@@ -48,11 +50,11 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     _require_rate(layout, plan)
     _require_no_other_rate(layout, plan, headings)
     if options.mapping is None or "time" not in options.mapping.model_fields_set:
-        layout = layout.beside(headings, table.has_samples)
+        layout = with_other_times(layout, headings, table)
     if plan.preset is not None:
-        layout = layout.comparing(headings, table.wordless, parted=table.parted)
+        layout = with_supplied(layout, headings, table)
     if not (table.parted or _names_one_impact(options)):
-        layout = layout.watching(table.wordless)
+        layout = with_unread(layout, table)
     blocks = table.blocks(layout.numbers, layout.texts)
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
     count = 0

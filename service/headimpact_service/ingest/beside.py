@@ -1,0 +1,44 @@
+"""Columns beside those that a layout reads, which may gainsay what it reads or tell its rows apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from headimpact_service.ingest.headings import Headings
+from headimpact_service.ingest.layout import Layout
+from headimpact_service.ingest.other_times import other_times
+from headimpact_service.ingest.supplied import spoken_in
+from headimpact_service.ingest.table import Table
+from headimpact_service.ingest.unread import unread_columns
+
+
+def with_other_times(layout: Layout, headings: Headings, table: Table) -> Layout:
+    """The layout, with the columns beside it that may say other times."""
+    return replace(layout, others=other_times(headings, {*layout.numbers, *layout.texts}, table.has_samples))
+
+
+def with_supplied(layout: Layout, headings: Headings, table: Table) -> Layout:
+    """The layout, with the resultants and peaks beside it; where the format parts impacts, peaks are no samples."""
+    passed = {*layout.numbers, *layout.texts}
+    unnamed = [name for name, signal in layout.signals.items() if not headings.name_units(name, signal.columns)]
+    signals = dict(layout.signals)
+    units = {name: signal.unit for name, signal in signals.items()}
+    for name, kind, found in spoken_in(headings, units, unnamed):
+        signal = signals[name]
+        if found.column in passed:
+            continue
+        if kind == "resultant" and (found.column in table.wordless or not table.parted):
+            signals[name] = replace(signal, resultants=(*signal.resultants, found))
+        elif kind == "peak" and found.column not in table.wordless:
+            signals[name] = replace(signal, peaks=(*signal.peaks, found))
+    return replace(layout, signals=signals)
+
+
+def with_unread(layout: Layout, table: Table) -> Layout:
+    """The layout, with the columns beside it that may tell several impacts from one."""
+    if layout.sample_number is not None:
+        return layout
+    passed = {*layout.numbers, *layout.texts, *table.wordless}
+    return replace(
+        layout, unread=unread_columns(layout.headings, passed, timed=layout.is_timed, keyed=bool(layout.keys))
+    )
