@@ -7,6 +7,7 @@ from dataclasses import replace
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.other_times import other_times
+from headimpact_service.ingest.presets import times_of
 from headimpact_service.ingest.supplied import spoken_in
 from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.unread import unread_columns
@@ -14,7 +15,8 @@ from headimpact_service.ingest.unread import unread_columns
 
 def with_other_times(layout: Layout, headings: Headings, table: Table) -> Layout:
     """The layout, with the columns beside it that may say other times."""
-    return replace(layout, others=other_times(headings, {*layout.numbers, *layout.texts}, table.has_samples))
+    read = {*layout.numbers, *layout.texts}
+    return replace(layout, others=other_times(headings, read, table.has_samples, times_of(headings)))
 
 
 def with_supplied(layout: Layout, headings: Headings, table: Table) -> Layout:

@@ -187,6 +187,11 @@ class Vocabulary:
             fields["time"] = times
         return mappings.Mapping.model_validate(fields)
 
+    def says_time(self, said: str) -> bool:
+        """Whether a heading is a word for the samples' times, with a unit."""
+        meaning = self.understand(said)
+        return meaning is not None and meaning.signal is None and meaning.unit is not None
+
     def own_times(self, headings: Headings) -> dict[SignalName, list[mappings.TimeColumn]]:
         """The columns of times that name one signal's sensor, as a time of the gyroscope."""
         found: dict[SignalName, list[mappings.TimeColumn]] = {}

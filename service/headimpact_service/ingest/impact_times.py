@@ -106,15 +106,27 @@ class ImpactTimes:
     def clock(self) -> Clock | None:
         """The column of times that the signals share: of several one that counts from the trigger, else the first."""
         first = self.layout.clock
-        return next(filter(self._has_trigger, self.layout.clocks), first) if self.layout.other_clocks else first
+        return next(filter(self._has_trigger, self._clocks), first) if len(self._clocks) > 1 else first
+
+    @cached_property
+    def _clocks(self) -> list[Clock]:
+        """The columns of times that the signals may share: also one of another name that counts from the trigger."""
+        first = self.layout.clock
+        if first is None:
+            return []
+        others = [Clock(one.column, one.milliseconds) for one in self.layout.others.clocks if one.may_count]
+        alike = (one for one in others if go_on_alike(self._times_ms(first), self._times_ms(one)))
+        return [*self.layout.clocks, *filter(self._has_trigger, alike)]
 
     def other_origins(self) -> Iterator[QualityNote]:
         """A note on columns of times that go on alike from another origin; 422 where they contradict each other.
 
         Times from the record's start, or from any other instant, say nothing against those from the trigger.
         """
-        for other in self.layout.clocks:
-            if self.clock is None or other is self.clock:
+        if self.clock is None:
+            return
+        for other in self._clocks:
+            if other is self.clock:
                 continue
             one, two = self._times_ms(self.clock), self._times_ms(other)
             if not agree(one, two):

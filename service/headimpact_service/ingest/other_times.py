@@ -15,11 +15,15 @@ _RATES = ("samplerate", "samplingrate", "samplefrequency", "samplingfrequency")
 
 @dataclass(frozen=True, slots=True)
 class OtherClock:
-    """A column of stamps that no signal is read by; `milliseconds` are those of one unit of them."""
+    """A column of stamps that no signal is read by; `milliseconds` are those of one unit of them.
+
+    One whose heading is a word for the samples' times `may_count`, if it goes on as they do.
+    """
 
     column: int
     heading: str
     milliseconds: float
+    may_count: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +46,9 @@ class OtherTimes:
 NO_OTHERS = OtherTimes()
 
 
-def other_times(headings: Headings, read: Collection[int], has_samples: Callable[[int], bool]) -> OtherTimes:
+def other_times(
+    headings: Headings, read: Collection[int], has_samples: Callable[[int], bool], times: Collection[int]
+) -> OtherTimes:
     """The columns of times and of rates beside those that are read.
 
     Parameters
@@ -53,6 +59,8 @@ def other_times(headings: Headings, read: Collection[int], has_samples: Callable
         The columns that are read.
     has_samples
         Whether a column may hold a number for each sample.
+    times
+        The columns whose headings are words for the samples' times.
     """
     clocks: list[OtherClock] = []
     rates: list[OtherRate] = []
@@ -61,7 +69,7 @@ def other_times(headings: Headings, read: Collection[int], has_samples: Callable
             continue
         unit = unit_of_times(heading, headings.units.get(column))
         if unit is not None and has_samples(column):
-            clocks.append(OtherClock(column, heading, TIME_UNITS[unit]))
+            clocks.append(OtherClock(column, heading, TIME_UNITS[unit], column in times))
         elif any(name in compact(heading) for name in _RATES):
             rates.append(OtherRate(column, heading, 1000.0 if "khz" in compact(heading) else 1.0))
     return OtherTimes(tuple(clocks), tuple(rates))

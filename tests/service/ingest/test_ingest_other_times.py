@@ -187,3 +187,28 @@ def test_rates_of_both_sensors_that_the_shared_times_gainsay_are_refused():
 def test_times_that_run_to_infinity_are_a_fault_of_the_impact(stamp: str):
     rows = [[stamp if n in {20, 21} else n, *row] for n, row in enumerate(six_axis().tolist())]
     assert codes(refused(table(["t_ms", *SIX], rows))) == [(None, "missing-sample")]
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("Time (ms)", "Time from Trigger (ms)"),
+        ("t_ms", "Relative Time (ms)"),
+        ("Elapsed (ms)", "time since trigger_ms"),
+    ],
+)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_times_from_the_trigger_count_whatever_they_are_called(first: str, second: str, swapped: bool):
+    columns = {first: lambda n: n, second: lambda n: n - 10}
+    names = sorted(columns, reverse=swapped)
+    rows = [[*(columns[name](n) for name in names), *row] for n, row in enumerate(six_axis().tolist())]
+    record = one(table([*names, *SIX], rows))
+    assert record.recording.pre_trigger_ms == 10.0
+    assert rates(record) == [1000.0, 1000.0]
+    assert [note.code for note in record.notes] == ["time_origin_mismatch"]
+
+
+def test_a_clock_that_counts_from_1970_beside_the_times_is_no_finding():
+    record = one(timed("timestamp_ms", lambda n: 1.7e12 + n))
+    assert record.notes == ()
+    assert record.recording.pre_trigger_ms is None

@@ -126,6 +126,12 @@ def spoken_of(headings: Headings) -> dict[SignalName, list[str]]:
     return _vocabulary(_generic().name).components(headings)
 
 
+def times_of(headings: Headings) -> set[int]:
+    """The columns whose headings are words for the samples' times, whatever layout they are read by."""
+    vocabulary = _vocabulary(_generic().name)
+    return {column for column, said in enumerate(headings.spoken) if vocabulary.says_time(said)}
+
+
 @cache
 def _vocabulary(name: str) -> Vocabulary:
     return Vocabulary(presets()[name].vocabulary or {})
