@@ -101,7 +101,7 @@ class RowLabels:
 
     def _require_counted(self) -> None:
         """Refuse samples that are left out, as numbers of them that are not read otherwise say."""
-        for column in self.layout.unread.counters:
+        for column in (*self.layout.unread.counters, *self.layout.unread.others):
             hole = left_out(self._cells(column))
             if hole is not None:
                 raise self._counted(column, *hole)
@@ -110,7 +110,7 @@ class RowLabels:
         heading = self.layout.headings[column]
         filled = (
             f', or name the column in a mapping ({{"sample_number": "{heading}"}}) and ask for fill_gaps'
-            if step == 1.0 and after - before <= MOST + 1
+            if heading and step == 1.0 and after - before <= MOST + 1
             else ""
         )
         return file_fault(

@@ -182,6 +182,13 @@ def test_numbers_of_samples_that_leave_some_out_are_refused_with_what_helps(head
     assert codes(refused(text, sample_rate_hz=1000.0, fill_gaps=True)) == [(None, "sample-order")]
 
 
+@pytest.mark.parametrize(("heading", "named"), [("", False), ("Unnamed: 0", True), ("tick", True)])
+def test_the_index_of_a_data_frame_that_lost_rows_is_seen_whatever_it_is_called(heading: str, named: bool) -> None:
+    problem = refused(counted(heading, [n for n in range(SAMPLES) if n != 15]), sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "sample-order")]
+    assert ("sample_number" in problem.detail) is named
+
+
 def test_a_gap_that_cannot_be_filled_is_refused_without_that_remedy() -> None:
     problem = refused(counted("Sample", [*range(15), *range(19, SAMPLES)]), sample_rate_hz=1000.0)
     assert "from 14 to 19" in problem.detail
