@@ -31,6 +31,7 @@ class Headings:
         self.dated = dated
         self._exact = _places(self.written)
         self._compact = _places([compact(heading) for heading in self.written])
+        self._again = _repeated(self._exact)
 
     @property
     def spoken(self) -> list[str]:
@@ -66,12 +67,27 @@ class Headings:
 
     def nearest(self, spelling: str, column: int) -> int | None:
         """Of the columns that a spelling names, the nearest before `column`, else the first."""
-        places = self._exact.get(spelling.strip()) or self._compact.get(compact(spelling)) or []
+        places = [*(self._exact.get(spelling.strip()) or self._compact.get(compact(spelling)) or [])]
+        places += [again for place in places for again in self._again.get(self.written[place], ())]
         return max((place for place in places if place < column), default=min(places, default=None))
+
+    def repeats(self, heading: str) -> bool:
+        """Whether several columns have a heading."""
+        return self.written.count(heading) > 1 or heading in self._again
 
 
 def _with_unit(heading: str, unit: str) -> str:
     return heading if compact(heading).endswith(compact(unit)) else f"{heading} {unit}"
+
+
+def _repeated(places: Mapping[str, list[int]]) -> dict[str, list[int]]:
+    """Further columns of a heading that stood twice, as a data frame tells them apart: `t_ms.1` beside `t_ms`."""
+    found: dict[str, list[int]] = {}
+    for name, of_name in places.items():
+        first, _, number = name.rpartition(".")
+        if number.isdecimal() and first in places:
+            found.setdefault(first, []).extend(of_name)
+    return found
 
 
 def _places(names: Sequence[str]) -> dict[str, list[int]]:
@@ -179,7 +195,7 @@ class Vocabulary:
             if signal in fields:
                 fields[signal]["time"] = times
         times = self.time(headings)
-        if any(headings.written.count(time.column) > 1 for time in times):  # one before each sensor's own columns
+        if any(headings.repeats(time.column) for time in times):  # one before each sensor's own columns
             for found_signal in SIGNALS:
                 if found_signal in fields:
                     fields[found_signal]["time"] = times

@@ -150,7 +150,8 @@ class ImpactTimes:
         """Refuse times and rates beside those that are read at which no signal is: one signal's may be among them."""
         rates = [rate for track in tracks if (rate := track.samples_per_s) is not None]
         for other_rate in self.layout.others.rates:
-            said = number_said(labels.said(other_rate.column))
+            distinct = labels.all_said(other_rate.column)  # a rate is the same in all rows
+            said = number_said(distinct[0]) if len(distinct) == 1 else None
             if said is not None and not _is_among(said * other_rate.hertz, rates, OTHER_CLOCK):
                 raise _other(other_rate.heading, said * other_rate.hertz)
         for other in self.layout.others.clocks:
@@ -241,7 +242,8 @@ def _other(heading: str, rate: float) -> Problem:
     return file_fault(
         f"The column {heading} says {rate:.5g} samples per second, at which no signal is read. If it is one sensor's, "
         'say so in a mapping, as {"angular_velocity": {"time": {"column": ..., "unit": ...}}} or {"angular_velocity": '
-        '{"sample_rate_hz": ...}}; else name the column that gives the times in its time, or leave this one out.',
+        '{"sample_rate_hz": ...}}. If it is of something else, name the times that count in the mapping, as {"time": '
+        '{"column": ..., "unit": ...}}, or say {"time": null} in it where a rate counts.',
         "rate-differs",
         parameter="sample_rate_hz",
     )

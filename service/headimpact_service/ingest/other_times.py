@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.mapping import TIME_UNITS
 from headimpact_service.ingest.spelling import compact
-from headimpact_service.ingest.time_headings import unit_of_times
-
-_RATES = ("samplerate", "samplingrate", "samplefrequency", "samplingfrequency")
+from headimpact_service.ingest.time_headings import hertz_of_rates, unit_of_times
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +60,7 @@ def other_times(
     times
         The columns whose headings are words for the samples' times.
     """
+    fs_is_rate = any(compact(heading) == "fs" for heading in headings.written)
     clocks: list[OtherClock] = []
     rates: list[OtherRate] = []
     for column, heading in enumerate(headings.written):
@@ -70,6 +69,6 @@ def other_times(
         unit = unit_of_times(heading, headings.units.get(column))
         if unit is not None and has_samples(column):
             clocks.append(OtherClock(column, heading, TIME_UNITS[unit], column in times))
-        elif any(name in compact(heading) for name in _RATES):
-            rates.append(OtherRate(column, heading, 1000.0 if "khz" in compact(heading) else 1.0))
+        elif (hertz := hertz_of_rates(heading, headings.units.get(column), fs_is_rate=fs_is_rate)) is not None:
+            rates.append(OtherRate(column, heading, hertz))
     return OtherTimes(tuple(clocks), tuple(rates))

@@ -1,4 +1,4 @@
-"""What headings of times say: the unit, and the sensor where it has times of its own."""
+"""What headings of times and of rates say: the unit, and the sensor where it has times or a rate of its own."""
 
 from __future__ import annotations
 
@@ -9,35 +9,83 @@ from headimpact_service.ingest.spelling import unit_ending, unit_spelled
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _TIMES = frozenset({"t", "time", "times", "stamp", "timestamp", "timestamps", "elapsed", "zeit", "temps", "tiempo"})
+_TIME_OF_ONE = re.compile(r"t[a-z]|[a-z]*time[a-z]*")
+"""A word such as `tg` or `gyrotime`."""
+_INSIDE = frozenset(
+    {"ms", "msec", "millisec", "milliseconds", "us", "usec", "microsec", "microseconds", "ns", "sec", "secs", "seconds"}
+)
+"""Units of time that mean one wherever they stand in a heading; a lone `s` may be a part of another unit."""
 _RATES = frozenset(
     {"rate", "frequency", "freq", "fs", "hz", "khz", "dt", "step", "interval", "period", "tvec", "tms", "ts"}
 )
-_FILTERS = frozenset({"filter", "cut", "cutoff", "corner", "lowpass", "heart"})
+_RATE = frozenset({"rate", "frequency", "freq"})
+_OF_SAMPLES = frozenset({"sample", "samples", "sampling", "acquisition"})
+_ALONE = frozenset(
+    {*("odr", "sr", "samplerate", "samplingrate", "samplefreq", "samplingfreq", "samplefrequency", "samplingfrequency")}
+)
+_NOT_OF_SAMPLES = frozenset(
+    {
+        *("filter", "cut", "cutoff", "corner", "lowpass", "highpass", "bandwidth"),
+        *("heart", "pulse", "respiration", "ecg", "emg", "video", "camera", "audio", "frames", "fps"),
+        *("mag", "magnetometer", "baro", "barometer", "gps", "quat", "quaternion", "temp", "temperature"),
+        *("original", "raw", "native", "source", "min", "max", "minimum", "maximum", "limit", "high"),
+    }
+)
+"""Words of what has times and rates of its own and is none of the signals, or no longer those of the samples."""
+_OF_SIGNALS = frozenset({"rad", "deg", "degrees", "dps", "g", "m", "x", "y", "z"})
+"""Words of a signal's units and axes."""
 _SENSORS: dict[SignalName, frozenset[str]] = {
     "linear_acceleration": frozenset({"acc", "accel", "accelerometer", "lin", "linear"}),
     "angular_velocity": frozenset({"gyr", "gyro", "gyroscope", "ang", "angular", "rot", "rotational", "ars", "omega"}),
 }
-"""Words for the sensor of a signal, in headings of its times."""
+"""Words for the sensor of a signal."""
+_ANY_SENSOR = frozenset[str]().union(*_SENSORS.values())
 
 
 def speaks_of_times(heading: str) -> bool:
     """Whether a heading may be that of times or of a rate of the samples, in whatever unit."""
     words = _words(heading)
-    return bool(words & (_TIMES | _RATES)) and not words & _FILTERS
+    return bool(words & (_TIMES | _RATES)) and not words & _NOT_OF_SAMPLES
 
 
 def unit_of_times(heading: str, beside: str | None) -> str | None:
-    """The unit of the times that a column holds, as its heading and the unit beside it say; None where they do not."""
-    unit = unit_spelled("time", beside) or unit_ending("time", heading)
-    return unit if unit is not None and _words(heading) & _TIMES else None
+    """The unit of the times that a column may hold, as its heading and the unit beside it say; None where it does not.
+
+    The heading may be any that names a unit of time and speaks of times or of a signal's sensor.
+    """
+    words = _words(heading)
+    if words & _NOT_OF_SAMPLES or not (words & (_TIMES | _ANY_SENSOR) or any(map(_TIME_OF_ONE.fullmatch, words))):
+        return None
+    inside = next((word for word in _listed(heading) if word in _INSIDE), None)
+    at_end = None if words & _OF_SIGNALS - {"x", "y"} else unit_ending("time", heading)
+    return unit_spelled("time", beside) or at_end or unit_spelled("time", inside)
 
 
 def sensor_of_times(heading: str) -> SignalName | None:
-    """The signal whose sensor a heading of times names."""
+    """The signal whose sensor a heading names that speaks of times outright."""
     words = _words(heading)
     named = [signal for signal, spelled in _SENSORS.items() if words & spelled]
-    return named[0] if len(named) == 1 else None
+    return named[0] if len(named) == 1 and words & _TIMES else None
+
+
+def hertz_of_rates(heading: str, beside: str | None, *, fs_is_rate: bool) -> float | None:
+    """How many hertz make one of what a column of a sample rate may say; None for any other heading.
+
+    Of one sensor `fs` may be its full scale, unless the table has a rate of this name.
+    """
+    words = _words(heading) | _words(beside or "")
+    if words & (_NOT_OF_SAMPLES | _OF_SIGNALS):
+        return None
+    in_hertz = "hz" in words and words & (_OF_SAMPLES | _ANY_SENSOR | _RATE | {"fs"})
+    of_one = words & _ANY_SENSOR and (words & _RATE or (fs_is_rate and "fs" in words))
+    if in_hertz or of_one or (words & _RATE and words & _OF_SAMPLES) or words & _ALONE or {"samples", "per"} <= words:
+        return 1000.0 if "khz" in f"{heading} {beside}".lower() else 1.0
+    return None
 
 
 def _words(heading: str) -> set[str]:
-    return {word.lower() for word in _WORD.findall(heading)}
+    return set(_listed(heading))
+
+
+def _listed(heading: str) -> list[str]:
+    return [word.lower() for word in _WORD.findall(heading)]

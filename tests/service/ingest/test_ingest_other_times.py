@@ -212,3 +212,57 @@ def test_a_clock_that_counts_from_1970_beside_the_times_is_no_finding():
     record = one(timed("timestamp_ms", lambda n: 1.7e12 + n))
     assert record.notes == ()
     assert record.recording.pre_trigger_ms is None
+
+
+@pytest.mark.parametrize("first", ["t_ms", "Time (ms)"])
+def test_a_data_frame_s_second_column_of_one_name_is_the_second_sensor_s(first: str):
+    assert rates(one(timed(f"{first}.1", first=first))) == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    "heading", ["t_ms_2", "Time (ms)_1", "Time (ms) 2", "t_ms_y", "tg_ms", "gyro_ms", "gyrotime_ms", "Clock Gyro (ms)"]
+)
+def test_times_are_seen_wherever_the_unit_stands(heading: str):
+    assert codes(refused(timed(heading))) == [("sample_rate_hz", "rate-differs")]
+    assert rates(one(timed(heading), mapping=gyro_time(heading))) == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    "heading", ["Mag Time (ms)", "baro_time_ms", "High-G Time (ms)", "Video time (ms)", "vel_x_m_s"]
+)
+def test_what_is_of_no_signal_is_no_clock(heading: str):
+    assert rates(one(timed(heading, lambda n: 10.0 * n))) == [1000.0, 1000.0]
+
+
+@pytest.mark.parametrize(
+    ("heading", "is_rate"),
+    [
+        ("gyro_fs", True),
+        ("fs_gyro", True),
+        ("gyro_rate_hz", True),
+        ("Gyro Rate", True),
+        ("gyro_hz", True),
+        ("samples_per_second", True),
+        ("SampleFreq", True),
+        ("ODR", True),
+        ("Sampling (Hz)", True),
+        ("Video Sample Rate (Hz)", False),
+        ("Mag Sample Rate (Hz)", False),
+        ("Original sample rate", False),
+        ("Filter Frequency (Hz)", False),
+        ("gyro_fs_dps", False),
+    ],
+)
+def test_columns_of_rates_are_those_of_the_samples(heading: str, is_rate: bool):
+    rows = [[*row, 1000, 2000] for row in six_axis().tolist()]
+    text = table([*SIX, "fs", heading], rows)
+    if is_rate:
+        assert codes(refused(text)) == [("sample_rate_hz", "rate-differs")]
+    else:
+        assert rates(one(text)) == [1000.0, 1000.0]
+    assert rates(one(text, mapping=Mapping.model_validate({"time": None}))) == [1000.0, 1000.0]
+
+
+def test_without_a_rate_of_that_name_a_gyroscope_s_fs_is_its_full_scale():
+    rows = [[*row, 2000] for row in six_axis().tolist()]
+    assert rates(one(table([*SIX, "gyro_fs"], rows), sample_rate_hz=1000.0)) == [1000.0, 1000.0]
