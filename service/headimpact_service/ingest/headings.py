@@ -212,7 +212,9 @@ class Vocabulary:
         """The columns of times that name one signal's sensor, as a time of the gyroscope."""
         found: dict[SignalName, list[mappings.TimeColumn]] = {}
         for column, heading in enumerate(headings.written):
-            unit, signal = unit_of_times(heading, headings.units.get(column)), sensor_of_times(heading)
+            signal = sensor_of_times(heading)
+            dates = mappings.DATES_IN if column in headings.dated else None
+            unit = dates or unit_of_times(heading, headings.units.get(column))
             if unit is not None and signal is not None:
                 time = mappings.TimeColumn.model_validate({"column": heading, "unit": unit})
                 found.setdefault(signal, []).append(time)
@@ -228,7 +230,9 @@ class Vocabulary:
         for place, (heading, said) in enumerate(zip(headings.written, headings.spoken, strict=True)):
             meaning, dated = self.understand(said), place in headings.dated
             if meaning is not None and meaning.signal is None and (dated or meaning.unit is not None):
-                column = mappings.TimeColumn.model_validate({"column": heading, "unit": meaning.unit or "us"})
+                column = mappings.TimeColumn.model_validate(
+                    {"column": heading, "unit": meaning.unit or mappings.DATES_IN}
+                )
                 found.append(((dated, self._clocks[compact(said)]), column))
         found.sort(key=lambda ranked: ranked[0])
         return list({column.column: column for rank, column in found if rank == found[0][0]}.values())

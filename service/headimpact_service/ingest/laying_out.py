@@ -10,7 +10,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.layout import Clock, Component, Layout, SignalLayout
-from headimpact_service.ingest.mapping import TIME_UNITS, DateAndTime, Mapping, SignalColumns
+from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS, DateAndTime, Mapping, SignalColumns
 from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.supplied import Kind, Supplied, supplied_in
 
@@ -167,7 +167,7 @@ def _clocks(mapping: Mapping, headings: Headings, required: bool, *, own: bool) 
 def _clock_in(column: int, unit: str, headings: Headings) -> Clock:
     """A column of stamps in a unit, unless the file says another beside its heading; dates have a unit of their own."""
     if column in headings.dated:
-        return Clock(column, TIME_UNITS["us"], dated=True)
+        return Clock(column, TIME_UNITS[DATES_IN], dated=True)
     beside = unit_spelled("time", headings.units.get(column))
     if beside not in {None, unit}:
         raise layout_problem(

@@ -25,6 +25,8 @@ from headimpact_service.ingest.impact_json import (
 MAX_SPELLINGS = 20
 TIME_UNITS = {"s": 1e3, "ms": 1.0, "us": 1e-3, "ns": 1e-6}
 """Units of a time column, in milliseconds."""
+DATES_IN = "us"
+"""What dates with times of day are read in, whatever unit is said of them."""
 
 
 def _as_list(value: Any) -> Any:  # noqa: ANN401 - validated after

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from headimpact_service.ingest.headings import Headings
-from headimpact_service.ingest.mapping import TIME_UNITS
+from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS
 from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.time_headings import hertz_of_rates, unit_of_times
 
@@ -66,7 +66,7 @@ def other_times(
     for column, heading in enumerate(headings.written):
         if column in read:
             continue
-        unit = unit_of_times(heading, headings.units.get(column))
+        unit = DATES_IN if column in headings.dated else unit_of_times(heading, headings.units.get(column))
         if unit is not None and has_samples(column):
             clocks.append(OtherClock(column, heading, TIME_UNITS[unit], column in times))
         elif (hertz := hertz_of_rates(heading, headings.units.get(column), fs_is_rate=fs_is_rate)) is not None:

@@ -11,20 +11,20 @@ from typing import Any, Generic, TypeVar
 from headimpact_service.answers import json_bytes
 from headimpact_service.routes.lists import Listing
 from headimpact_service.routes.tables import Cell
-from headimpact_service.store.columns import EPOCH
+from headimpact_service.store.columns import EPOCH, MICROSECOND
 from headimpact_service.store.ids import LENGTH
-from headimpact_service.store.paging import Page, Position, bad_cursor, page_of
+from headimpact_service.store.paging import Page, Position, page_of
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
 class Held(Generic[T]):
-    """A row that is in memory; a cursor knows it by its name alone."""
+    """A row that is in memory; a cursor knows it by its name, and its place in the time that rows have elsewhere."""
 
     id: bytes
     item: T
-    updated_at: datetime = EPOCH
+    updated_at: datetime
 
 
 def short_listing(
@@ -53,7 +53,10 @@ def short_listing(
     """
 
     def page(conn: Any, after: Position | None, limit: int) -> Page[Held[T]]:  # noqa: ANN401 - a connection of the store
-        rows = [Held(_id(str(document(item)[key])), item) for item in read(conn)]
+        rows = [
+            Held(_id(str(document(item)[key])), item, EPOCH + place * MICROSECOND)
+            for place, item in enumerate(read(conn))
+        ]
         return page_of(_behind(rows, after), limit)
 
     def members(item: T) -> Sequence[Cell]:
@@ -77,13 +80,11 @@ def _id(name: str) -> bytes:
 
 
 def _behind(rows: Sequence[Held[T]], after: Position | None) -> Sequence[Held[T]]:
-    """The rows behind the last one of the page before; a `bad-cursor` problem if that one is gone."""
+    """The rows behind the last one of the page before, or from its place on if that one is gone."""
     if after is None:
         return rows
     place = next((place for place, row in enumerate(rows) if row.id == after.id), None)
-    if place is None:
-        raise bad_cursor()
-    return rows[place + 1 :]
+    return rows[(after.updated_at - EPOCH) // MICROSECOND if place is None else place + 1 :]
 
 
 def _cell(value: Any) -> Cell:  # noqa: ANN401 - whatever a document holds

@@ -68,9 +68,9 @@ def decode_cursor(cursor: str, of: str) -> Position:
         raw = cursor.encode("ascii")
         mark, microseconds, identifier, check = _FORM.unpack(urlsafe_b64decode(raw + b"=" * (-len(raw) % 4)))
     except (UnicodeEncodeError, binascii.Error, struct.error):
-        raise bad_cursor() from None
+        raise _bad_cursor() from None
     if mark != _mark(of) or not 0 <= microseconds <= _LATEST or check != _check(mark, microseconds, identifier):
-        raise bad_cursor()
+        raise _bad_cursor()
     return Position(EPOCH + timedelta(microseconds=microseconds), identifier)
 
 
@@ -83,8 +83,7 @@ def _mark(of: str) -> bytes:
     return blake2b(of.encode(errors="backslashreplace"), digest_size=4).digest()
 
 
-def bad_cursor() -> Problem:
-    """The 400 for a cursor that this list cannot go on from."""
+def _bad_cursor() -> Problem:
     return Problem("bad-cursor", "The cursor was not made by this list with these filters.")
 
 

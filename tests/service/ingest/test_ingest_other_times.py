@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -266,3 +267,39 @@ def test_columns_of_rates_are_those_of_the_samples(heading: str, is_rate: bool):
 def test_without_a_rate_of_that_name_a_gyroscope_s_fs_is_its_full_scale():
     rows = [[*row, 2000] for row in six_axis().tolist()]
     assert rates(one(table([*SIX, "gyro_fs"], rows), sample_rate_hz=1000.0)) == [1000.0, 1000.0]
+
+
+def stamped(step_ms: float) -> Callable[[int], str]:
+    """Dates with times of day, a sample each."""
+    first = datetime(2026, 10, 3, 14, 5, 22, tzinfo=UTC)
+    return lambda n: (first + timedelta(milliseconds=step_ms * n)).isoformat(timespec="microseconds")
+
+
+@pytest.mark.parametrize("heading", ["gyro_timestamp", "Gyro Time", "timestamp_gyro"])
+def test_dates_that_name_a_sensor_are_its_own_times(heading: str):
+    rows = [[stamped(1.0)(n), *row[:3], stamped(0.5)(n), *row[3:]] for n, row in enumerate(six_axis().tolist())]
+    assert rates(one(table(["timestamp", *SIX[:3], heading, *SIX[3:]], rows))) == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize("heading", ["t2", "recorded_at", "Timestamp (UTC)", "Date"])
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_dates_at_which_no_signal_is_read_are_refused(heading: str, form: str):
+    def written(step_ms: float) -> str | bytes:
+        columns: dict[str, list[Any]] = {"t_ms": [SHARED * n for n in range(40)]}
+        columns |= dict(zip(SIX, six_axis().T.tolist(), strict=True))
+        columns[heading] = [stamped(step_ms)(n) for n in range(40)]
+        if form == "csv":
+            return table(list(columns), list(zip(*columns.values(), strict=True)))
+        columns[heading] = [datetime.fromisoformat(text) for text in columns[heading]]
+        return parquet(pa.table(columns))
+
+    assert codes(refused(written(0.5))) == [("sample_rate_hz", "rate-differs")]
+    assert rates(one(written(1.0))) == [1000.0, 1000.0]
+
+
+@pytest.mark.parametrize("heading", ["datetime", "Timestamp (UTC)", "recorded_at", "Date"])
+def test_a_rate_is_held_against_dates_of_any_name(heading: str):
+    rows = [[stamped(0.5)(n), *row] for n, row in enumerate(six_axis().tolist())]
+    text = table([heading, *SIX], rows)
+    assert codes(refused(text, sample_rate_hz=1000.0)) == [("sample_rate_hz", "rate-differs")]
+    assert rates(one(text, sample_rate_hz=2000.0)) == [2000.0, 2000.0]
