@@ -39,6 +39,7 @@ CODES: tuple[str, ...] = (
     "low_rate_for_class",
     "out_of_plane_removed",
     "channel_missing",
+    "channel_given_twice",
     "questionable_data",
     "sample_count_mismatch",
     "time_origin_mismatch",

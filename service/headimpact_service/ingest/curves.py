@@ -76,6 +76,21 @@ def _common(curves: Sequence[Curve]) -> list[Curve]:
     ]
 
 
+def check_twice(signal: SignalName, read: tuple[str, Curve], other: tuple[str, Curve]) -> Iterator[QualityNote]:
+    """One channel that a file gives twice: what was read of it against the other, each with its name."""
+    (name, curve), (other_name, other_curve) = read, other
+    if curve.unit == other_curve.unit and curve.values.size == other_curve.values.size:
+        if np.array_equal(curve.values, other_curve.values, equal_nan=True):
+            return
+        differences = np.abs(curve.values - other_curve.values)
+        what = f"differ by up to {np.nanmax(differences, initial=0.0):.4g} {curve.unit}"
+    else:
+        sizes = (f"{one.values.size} samples in {one.unit}" for one in (curve, other_curve))
+        what = f"differ ({' and '.join(sizes)})"
+    detail = f"{name} and {other_name} say that they are the same channel and {what}; {name} was read."
+    yield QualityNote("channel_given_twice", "warning", detail, signal, curve.axis)
+
+
 def check_cut(signal: SignalName, curves: Sequence[Curve], read: FloatArray) -> Iterator[QualityNote]:
     """What the curves of one signal lose by being cut to what all of them have, the samples that are `read`."""
     for curve in curves:

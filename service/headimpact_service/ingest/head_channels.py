@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant, words
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, check_cut, head_recording
+from headimpact_service.ingest.curves import Curve, check_cut, check_twice, head_recording
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.filling import how_filled
 from headimpact_service.ingest.impact_reading import low_pass
@@ -110,7 +111,15 @@ class _Head:
             self.used.append(channel)
             curves.append(curve)
             self._say_status(channel, curve)
+            self._say_twice(channel, curve)
         return curves
+
+    def _say_twice(self, read: HeadChannel, curve: Curve) -> None:
+        """Whether the head has another channel that by its code is the same, and is not: the same filter and state."""
+        for other in self.channels:
+            if other is not read and _sameness(other) == _sameness(read):
+                with suppress(Problem):  # what cannot be read contradicts nothing
+                    self.notes += check_twice(read.code.signal, (read.named, curve), (other.named, other.read()))
 
     def _say_status(self, channel: HeadChannel, curve: Curve) -> None:
         """What its laboratory says of a channel, and whether it is as long as it should be."""
@@ -167,6 +176,10 @@ class _Head:
         names = {f"{c.code.signal}_{c.code.axis}": c.code.code for c in self.used}
         filters = {f"{c.code.signal}_{c.code.axis}": c.filtering for c in self.used}
         return {"channels": names, "filtered_before": filters}
+
+
+def _sameness(channel: HeadChannel) -> tuple[SignalName, str, int, bool]:
+    return channel.code.signal, channel.code.axis, channel.code.strength, channel.invalid is not None
 
 
 def _rank(channel: HeadChannel) -> tuple[bool, int, str]:

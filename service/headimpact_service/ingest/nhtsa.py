@@ -14,7 +14,7 @@ from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.curves import Curve, check_cut, head_recording
+from headimpact_service.ingest.curves import Curve, check_cut, check_twice, head_recording
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass
@@ -149,7 +149,19 @@ class _Head:
         if absent or len(channels) < len(AXES):
             return []
         self.read += channels
-        return [self._curve(channel) for channel in channels]
+        curves = [self._curve(channel) for channel in channels]
+        for channel, curve in zip(channels, curves, strict=True):
+            self._say_twice(channel, curve)
+        return curves
+
+    def _say_twice(self, read: Channel, curve: Curve) -> None:
+        """Whether the occupant has another channel that is the same by its row, and is not by its curve."""
+        for other in self.test.channels:
+            if other.curve != read.curve and other.curve in self.curves and _sameness(other) == _sameness(read):
+                with suppress(Problem):  # what cannot be read contradicts nothing
+                    stamps, values = _columns(self.archive.read(self.curves[other.curve]), other)
+                    second = Curve(other.axis, other.unit or "an unknown unit", values, stamps, None)
+                    self.notes += check_twice(read.signal, (read.named, curve), (other.named, second))
 
     def _curve(self, channel: Channel) -> Curve:
         data = self.archive.read(self.curves[channel.curve])
@@ -195,6 +207,10 @@ class _Head:
         if self.occupant in self.test.laboratory:
             metadata["laboratory"] = self.test.laboratory[self.occupant]
         return metadata
+
+
+def _sameness(channel: Channel) -> tuple[Occupant, SignalName, str, bool, bool]:
+    return channel.occupant, channel.signal, channel.axis, channel.valid, channel.primary
 
 
 def _columns(data: bytes, channel: Channel) -> tuple[FloatArray, FloatArray]:
