@@ -29,6 +29,7 @@ from headimpact_service.ingest.dts_header import (
     read_header,
     without_empty_end,
 )
+from headimpact_service.ingest.dts_rate import sample_rate, with_mapped_rate
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
@@ -53,10 +54,10 @@ _UNITS_PER_S = (1.0, 1e3, 1e6)
 
 
 def is_dts(head: bytes) -> bool:
-    """Whether a text file begins with the rows of a DTS header: a rate and the channels' codes or units."""
+    """Whether a text file begins with the rows of a DTS header: the channels' codes, and their units or a rate."""
     rows = [line.split(_delimiter(line)) for line in decoded_head(head)[:MAX_HEADER_ROWS]]
     told = {name for row in rows if (name := key_of(row[0])) is not None and len(row) > 1}
-    return not told.isdisjoint({"rate", "rate_khz"}) and "code" in told
+    return not told.isdisjoint({"rate", "rate_khz", "unit"}) and "code" in told
 
 
 def decoded_head(head: bytes) -> list[str]:
@@ -70,9 +71,10 @@ def read_dts(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | 
 
     With a mapping, its columns are found by the channels' codes or names, and the header gives rate and trigger.
     """
+    options = with_mapped_rate(options)
     rows = _rows(source)
     header, first = read_header(rows)
-    data = _Data(header, rows[first:])
+    data = _Data(header, rows[first:], sample_rate(header, options))
     if options.mapping is not None:
         yield from _mapped(data, options)
         return
@@ -128,9 +130,9 @@ def _delimiter(line: str) -> str:
 class _Data:
     """The samples, by channel."""
 
-    def __init__(self, header: Header, rows: Sequence[Sequence[str]]) -> None:
+    def __init__(self, header: Header, rows: Sequence[Sequence[str]], rate: float) -> None:
         """Look at the header only; columns are read as they are asked for."""
-        self.header = header
+        self.header, self.rate = header, rate
         codes = header.fields.get("code", [])
         names = header.names
         self.channels = max(len(codes), len(names), len(header.fields.get("unit", [])))
@@ -144,10 +146,6 @@ class _Data:
                 "The headings above the samples stand in another order than the channels' codes: which is right?",
                 "heading-order",
             )
-        rate = header.rate_hz
-        if rate is None or rate <= 0.0:
-            raise file_fault("The header gives no sample rate.", "rate-missing")
-        self.rate = rate
         self.points_before = self._points_before()
 
     def _first_column(self) -> int:
@@ -192,8 +190,8 @@ class _Data:
             return None
         step = float(np.median(np.diff(times)))
         raise file_fault(
-            f"The column before the channels steps by {step:g}, evenly or not, where the header says {self.rate:g} "
-            "samples per second: which of them is right?",
+            f"The column before the channels steps by {step:g}, evenly or not, where {self.rate:g} samples per "
+            "second are said: which of them is right?",
             "rates-differ",
         )
 

@@ -189,7 +189,6 @@ def test_channels_without_iso_codes_are_read_with_a_mapping_by_their_names():
     [
         ({"Sample Rate (Hz)": ["fast"] * 6}, "rates-differ"),
         ({"Sample Rate (Hz)": ["20000"] * 5 + ["10000"]}, "rates-differ"),
-        ({"Sample Rate (Hz)": ["0"] * 6}, "rate-missing"),
         ({"Engineering Unit": ["furlong"] * 6}, "unit-missing"),
         ({"Engineering Unit": ["deg/s"] * 3 + ["g", "g", "m/s^2"]}, "units-differ"),
     ],
@@ -313,3 +312,51 @@ def test_a_time_before_the_trigger_counts_its_samples():
     text = dts(before=None, time_column=False, changes={"Pre Trigger (sec)": [0.0005], "Post-zero Points": [50]})
     text = text.replace("Number of Pts (Total)", "Points of the disk")
     assert one(text).notes == ()
+
+
+class TestRateBesideTheFile:
+    """A header that says no rate, as of an export that calls it something else."""
+
+    SILENT = dts(time_column=False).replace("Sample Rate (Hz)", "Samples Per Second")
+
+    @pytest.mark.parametrize("named", [None, "dts"])
+    def test_no_rate_anywhere_is_refused_with_what_to_give(self, named):
+        problem = refused(self.SILENT, preset=named)
+        assert codes(problem) == [("sample_rate_hz", "rate-missing")]
+        assert "give sample_rate_hz beside the file" in problem.detail
+        assert codes(refused(dts(changes={"Sample Rate (Hz)": ["0"] * 6}))) == codes(problem)
+
+    @pytest.mark.parametrize(
+        "given",
+        [
+            {"sample_rate_hz": 20_000.0},
+            {"mapping": Mapping(sample_rate_hz=20_000.0)},
+            {"mapping": Mapping(sample_rate_hz=20_000.0), "sample_rate_hz": 20_000.0},
+        ],
+    )
+    def test_a_rate_beside_the_file_or_of_a_mapping_counts(self, given):
+        recording = one(self.SILENT, **given).recording
+        assert recording.linear_acceleration.sample_rate_hz == 20_000.0
+        assert recording.pre_trigger_ms == 0.5
+
+    def test_it_counts_for_channels_that_a_mapping_names_too(self):
+        uncoded = self.SILENT.replace("ISO Channel Code", "Channel Code")
+        columns = {"x": "Head 4", "y": "Head 5", "z": "Head 6"}
+        for rate in ({"sample_rate_hz": 20_000.0}, {"linear_acceleration": columns | {"sample_rate_hz": 20_000.0}}):
+            mapping = Mapping.model_validate({"linear_acceleration": columns} | rate)
+            recording = one(uncoded, preset="dts", mapping=mapping).recording
+            assert (recording.linear_acceleration.sample_rate_hz, recording.pre_trigger_ms) == (20_000.0, 0.5)
+
+    def test_a_column_of_times_must_go_on_at_it(self):
+        timed = dts().replace("Sample Rate (Hz)", "Samples Per Second")
+        assert one(timed, sample_rate_hz=20_000.0).recording.pre_trigger_ms == 0.5
+        assert codes(refused(timed, sample_rate_hz=10_000.0)) == [(None, "rates-differ")]
+
+    def test_another_rate_than_the_header_s_is_refused(self):
+        uncoded = dts().replace("ISO Channel Code", "Channel Code")
+        columns = {"x": "Head 4", "y": "Head 5", "z": "Head 6"}
+        mapping = Mapping.model_validate({"linear_acceleration": columns, "sample_rate_hz": 10_000.0})
+        assert codes(refused(uncoded, preset="dts", mapping=mapping)) == [("/sample_rate_hz", "rates-differ")]
+        assert codes(refused(dts(), sample_rate_hz=10_000.0))[0][1] == "rate-differs"
+        both = refused(self.SILENT, mapping=Mapping(sample_rate_hz=10_000.0), sample_rate_hz=20_000.0)
+        assert codes(both) == [("/sample_rate_hz", "rates-differ")]
