@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.blank_lines import BlankLines
 from headimpact_service.ingest.cells import LineCells, is_no_number
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
 from headimpact_service.ingest.decimal_commas import (
@@ -79,6 +80,7 @@ class CsvTable:
         self._line = 0
         self._begun, self._empty_rows = False, 0
         self._joined = False
+        self._blank_lines = BlankLines()
         self._ends: list[int] = []  # the line that each row of a block ends in
         above, heading, has_units = self._find_headings(skip_rows)
         self._delimiter = delimiter_of(heading)
@@ -108,6 +110,7 @@ class CsvTable:
                 numbers=dict(zip(numbers, columns, strict=True)),
                 texts=dict(zip(texts, cells, strict=True)),
                 joined=self._joined,
+                spaced_apart=self._blank_lines.part_rows,
             )
 
     def _find_headings(self, skip_rows: int) -> tuple[str, str, bool]:
@@ -189,6 +192,7 @@ class CsvTable:
             return None
         if len(samples) != len(lines):
             return None
+        self._blank_lines.rows(len(lines))
         return samples, [LineCells(lines, self._delimiter, index) for index in texts]
 
     def _careful(self, rows: list[list[str]], numbers: Sequence[int], texts: Sequence[int]) -> Block:
@@ -216,7 +220,10 @@ class CsvTable:
         """
         width = len(self.headings)
         if not any(cell.strip() for cell in row):
-            self._empty_rows += self._begun and len(row) > 1
+            if len(row) > 1:
+                self._empty_rows += self._begun
+            else:
+                self._blank_lines.blank()
             return
         if len(row) < width and row[0].lstrip().startswith("#"):
             return
@@ -234,6 +241,7 @@ class CsvTable:
             )
         yield from ([""] * width for _ in range(self._empty_rows))
         self._begun, self._empty_rows = True, 0
+        self._blank_lines.rows()
         yield row[:width]
 
     def _value(self, cell: str, column: int) -> float:

@@ -134,6 +134,12 @@ class Layout:
         clocks = [signal.clock or self.clock for signal in self.signals.values()]
         return all(clock is not None and not clock.dated for clock in clocks)
 
+    @property
+    def has_order(self) -> bool:
+        """Whether times or numbers of its samples say how the rows follow each other."""
+        timed = all(signal.clock or self.clock for signal in self.signals.values())
+        return timed or self.sample_number is not None
+
     def ends_alone(self, name: SignalName) -> bool:
         """Whether a signal's rows may end before the others': it has times or a rate of its own, or others have."""
         if self.signals[name].is_apart:

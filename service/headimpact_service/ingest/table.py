@@ -18,7 +18,7 @@ class Columns:
 
     Where the format itself parts impacts, `lengths` says how many rows each of them has, a block holds whole impacts,
     and `texts` have one cell an impact; else they have one cell a row. `joined` says that the headings stood again
-    among these rows, as where files were joined.
+    among these rows, as where files were joined, `spaced_apart` that blank lines part them into blocks.
     """
 
     rows: int
@@ -26,6 +26,7 @@ class Columns:
     texts: Mapping[int, Sequence[str]]
     lengths: list[int] | None = None
     joined: bool = False
+    spaced_apart: bool = False
 
 
 class Table(Protocol):

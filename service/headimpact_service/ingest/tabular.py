@@ -58,7 +58,8 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     blocks = table.blocks(layout.numbers, layout.texts)
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
     count = 0
-    for window in windows(blocks, layout.keys, parted=table.parted, max_single=max_single):
+    may_space = layout.has_order or _names_one_impact(options)
+    for window in windows(blocks, layout.keys, parted=table.parted, max_single=max_single, may_space=may_space):
         count += len(window.impacts)
         if count > options.max_impacts:
             raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")

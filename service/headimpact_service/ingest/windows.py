@@ -34,21 +34,25 @@ class Window:
     first: int
 
 
-def windows(blocks: Iterable[Columns], keys: Sequence[int], *, parted: bool, max_single: int) -> Iterator[Window]:
+def windows(
+    blocks: Iterable[Columns], keys: Sequence[int], *, parted: bool, max_single: int, may_space: bool = True
+) -> Iterator[Window]:
     """The impacts of a table: as its format parts them, by the columns `keys`, or all rows as one impact.
+
+    Blocks of rows that blank lines part are one impact only where they `may_space`: times or the sender say so.
 
     Raises
     ------
     Problem
-        422: a single impact of more than `max_single` rows, too many rows, or rows of one impact that stand too far
-        apart.
+        422: a single impact of more than `max_single` rows or in blocks, too many rows, or rows of one impact that
+        stand too far apart.
     """
     if parted:
         yield from _parted(blocks)
     elif keys:
         yield from _keyed(blocks, keys)
     else:
-        yield from _single(blocks, max_single)
+        yield from _single(blocks, max_single, may_space=may_space)
 
 
 def _parted(blocks: Iterable[Columns]) -> Iterator[Window]:
@@ -61,7 +65,7 @@ def _parted(blocks: Iterable[Columns]) -> Iterator[Window]:
         first = _counted(first, block.rows)
 
 
-def _single(blocks: Iterable[Columns], max_rows: int) -> Iterator[Window]:
+def _single(blocks: Iterable[Columns], max_rows: int, *, may_space: bool) -> Iterator[Window]:
     held: list[Columns] = []
     count = 0
     for block in blocks:
@@ -71,6 +75,12 @@ def _single(blocks: Iterable[Columns], max_rows: int) -> Iterator[Window]:
             raise file_fault(
                 "The headings stand again among the samples: if files of several impacts were joined, tell them apart "
                 "by a column impact_id or a mapping's group_by.",
+                "several-impacts",
+            )
+        if block.spaced_apart and not may_space:
+            raise file_fault(
+                "Blank lines part the rows, as between impacts, and the samples have no times: tell impacts apart by a "
+                "column impact_id or a mapping's group_by, or say with an empty one that all rows are one impact.",
                 "several-impacts",
             )
         if count > max_rows:
