@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Mapping
 from datetime import datetime
 from functools import lru_cache
 from typing import Annotated, Any, get_args
@@ -11,6 +13,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import from_json
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.date_order import DateOrder, year_first
 from headimpact_service.ingest.decimal_commas import has_decimal_comma
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import (
@@ -103,13 +106,23 @@ def checked_name(text: str | None, field: str) -> str | None:
     return text
 
 
-def moment(parts: list[str | None], time_zone: str | None) -> datetime | None:
-    """The instant of one cell, or of a date's and a time's."""
-    if not any(parts):
+def moment(parts: Mapping[str, str | None], time_zone: str | None, order: DateOrder | None) -> datetime | None:
+    """The instant of one cell, or of a date's and a time's, by the headings of their columns."""
+    date, *time = parts.values()
+    if not (date or any(time)):
         return None
-    text = (parts[0] or "").replace("/", "-") + "".join(f"T{part}" for part in parts[1:])
     try:
-        return instant(text, time_zone)
+        return instant("T".join(map(str, (year_first(date or "", order), *time))), time_zone)
     except TimeError as error:
+        raise _time_problem(error, list(parts)) from None
+
+
+def _time_problem(error: TimeError, headings: list[str]) -> Problem:
+    """What is wrong with a time, and where it can be mended: beside the file, or in the mapping that says its order."""
+    if error.code not in {"date-order", "date-order-missing"}:
         detail = f"{error} If the file's own time is broken, give occurred_at beside the file."
-        raise file_fault(detail, error.code, parameter=error.field) from None
+        return file_fault(detail, error.code, parameter=error.field)
+    named = dict(zip(("date", "time"), headings, strict=False))
+    shown = json.dumps({"occurred_at": named | {"order": "dmy"}}, ensure_ascii=False)
+    detail = f"{error} Say the order in a mapping: {shown}, or mdy or ymd; or give occurred_at beside the file."
+    return file_fault(detail, error.code, parameter="mapping", pointer="/occurred_at/order")

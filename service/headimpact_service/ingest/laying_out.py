@@ -54,6 +54,7 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
         athlete=_optional("athlete", mapping.athlete, headings, required),
         device=_optional("device", mapping.device, headings, required),
         occurred_at=_occurred_at(mapping, headings, "occurred_at" in required),
+        date_order=mapping.occurred_at.order if isinstance(mapping.occurred_at, DateAndTime) else None,
         context=_context(mapping, headings, required),
         reading=_named("reading", mapping.reading, headings, required),
         unscorable=_optional("unscorable", mapping.unscorable, headings, required),
@@ -217,9 +218,9 @@ def _occurred_at(mapping: Mapping, headings: Headings, required: bool) -> tuple[
     if when is None:
         return ()
     parts = [when.date, when.time] if isinstance(when, DateAndTime) else [when]
-    found = [headings.find(spellings) for spellings in parts]
+    found = [headings.find(spellings) for spellings in filter(None, parts)]
     columns = tuple(column for column in found if column is not None)
-    if len(columns) == len(parts):
+    if len(columns) == len(found):
         return columns
     if required:
         raise _missing("The column of occurred_at was not found.", "/occurred_at")

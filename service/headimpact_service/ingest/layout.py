@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from headimpact.recording import AXES, SignalName
+from headimpact_service.ingest.date_order import DateOrder
 from headimpact_service.ingest.other_times import NO_OTHERS, OtherTimes
 from headimpact_service.ingest.supplied import Supplied
 from headimpact_service.ingest.unread import NOTHING_UNREAD, Unread
@@ -68,6 +69,7 @@ class Layout:
     athlete: int | None
     device: int | None
     occurred_at: tuple[int, ...]
+    date_order: DateOrder | None
     context: dict[str, int]
     reading: dict[str, int]
     unscorable: int | None

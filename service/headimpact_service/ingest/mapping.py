@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from headimpact.recording import SIGNALS, SignalName
+from headimpact_service.ingest.date_order import DateOrder
 from headimpact_service.ingest.impact_json import (
     MAX_RATE_HZ,
     MIN_RATE_HZ,
@@ -87,10 +88,14 @@ class AngularAccelerationColumns(SignalColumns):
 
 
 class DateAndTime(Strict):
-    """An instant that is spread over two columns: an ISO date and a time of day."""
+    """An instant that is spread over two columns, a date and a time of day, or in one, `date`, with both.
+
+    `order` says what the numbers of a date are that does not begin with its year: 25/03/2026 is `dmy`.
+    """
 
     date: Spellings
-    time: Spellings
+    time: Spellings | None = None
+    order: DateOrder | None = None
 
 
 ContextField = Literal[

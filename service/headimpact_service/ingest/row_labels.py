@@ -132,7 +132,8 @@ class RowLabels:
         """Times that go on from sample to sample are those of the samples; others are of several impacts."""
         rows = numbers_of(self.rows)
         told = dict.fromkeys(tuple(said(self.texts[column][row]) for column in columns) for row in rows)
-        moments = [moment_of("T".join(parts), time_zone) for parts in told if all(parts)]
+        order = self.layout.date_order
+        moments = [moment_of("T".join(parts), time_zone, order) for parts in told if all(parts)]
         known = [when for when in moments if when is not None]
         if known and span_s(known) > longest_s(len(rows)):
             raise self._several(columns[0], _TIME)

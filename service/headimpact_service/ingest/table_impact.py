@@ -253,7 +253,8 @@ class TableImpact:
         columns = self.layout.occurred_at
         if not columns or self.options.occurred_at is not None:
             return None
-        return moment([self._text(column) for column in columns], self.options.time_zone)
+        parts = {self.layout.headings[column]: self._text(column) for column in columns}
+        return moment(parts, self.options.time_zone, self.layout.date_order)
 
     def _metadata(self) -> dict[str, Any]:
         told = {"format": self.plan.format, "preset": self.plan.preset, "file": self.options.filename}

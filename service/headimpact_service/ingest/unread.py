@@ -16,6 +16,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from headimpact_service.ingest.cells import is_written_number, said
+from headimpact_service.ingest.date_order import DateOrder, year_first
 from headimpact_service.ingest.impact_json import MIN_RATE_HZ
 from headimpact_service.ingest.times import TimeError, instant
 
@@ -236,9 +237,9 @@ def span_s(moments: Sequence[datetime]) -> float:
     return (max(moments) - min(moments)).total_seconds()
 
 
-def moment_of(text: str, time_zone: str | None) -> datetime | None:
+def moment_of(text: str, time_zone: str | None, order: DateOrder | None = None) -> datetime | None:
     """A date with its time, in any zone; None for anything else."""
     try:
-        return instant(text.replace("/", "-"), time_zone or "UTC")
+        return instant(year_first(text, order), time_zone or "UTC")
     except TimeError:
         return None
