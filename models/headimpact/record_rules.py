@@ -16,7 +16,7 @@ from headimpact.kinematics import FloatArray
 from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import AXES, words
 from headimpact.recording import TO_CRITERIA_UNIT, Recording, Signal, SignalName
-from headimpact.stamps import is_like, rate_said
+from headimpact.stamps import is_like, may_be_rounded, rate_said
 
 UNITS_OF: dict[str, tuple[str, str]] = {
     "linear_acceleration": ("g", "m/s^2"),
@@ -108,10 +108,11 @@ def _faults_of_stamps(name: SignalName, time_s: FloatArray) -> Iterator[TraceErr
     """Every stamp that does not follow the one before it; where all do, every step that is not like the others."""
     steps = np.diff(time_s)
     stuck = np.flatnonzero(~(steps > 0))
+    remedy = _if_rounded(time_s) if stuck.size else ""
     for place in stuck:
         yield TraceError(
             "time-not-increasing",
-            f"The time stamps of the {words(name)} must increase from sample to sample.",
+            f"The time stamps of the {words(name)} must increase from sample to sample{remedy}.",
             signal=name,
             index=int(place) + 1,
         )
@@ -119,13 +120,20 @@ def _faults_of_stamps(name: SignalName, time_s: FloatArray) -> Iterator[TraceErr
         return
     bound = QUALITY_LIMITS["record"]["maximum_jitter"]
     median = float(np.median(steps))
-    for place in np.flatnonzero(~is_like(steps, median, time_s)):
+    uneven = np.flatnonzero(~is_like(steps, median, time_s))
+    remedy = _if_rounded(time_s) if uneven.size else ""
+    for place in uneven:
         yield TraceError(
             "time-jitter",
-            f"The steps between time stamps of the {words(name)} must stay within {bound:.0%} of their median.",
+            f"The steps between time stamps of the {words(name)} must stay within {bound:.0%} of their median{remedy}.",
             signal=name,
             index=int(place) + 1,
         )
+
+
+def _if_rounded(time_s: FloatArray) -> str:
+    """What helps where the digits of stamps may be to blame."""
+    return "; if they are rounded, give sample_rate_hz for them" if may_be_rounded(time_s) else ""
 
 
 def require_within(name: SignalName, values: FloatArray) -> None:

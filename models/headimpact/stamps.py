@@ -14,6 +14,9 @@ FloatArray = NDArray[np.float64]
 ROUND_RATE = 1e-9
 """Relative: a rate this near to a whole number of hertz is that number, which its decimal stamps could not say."""
 
+_DECIMALS_S = (1e-3, 1e-4, 1e-5, 1e-6)
+"""What stamps are written to [s], where that is coarse beside a step."""
+
 
 def rounding_s(time_s: FloatArray) -> float:
     """How far a step between stamps may be off [s] because of the digits that a number holds.
@@ -42,3 +45,23 @@ def rate_said(time_s: FloatArray) -> float:
         return rate
     whole = float(round(rate))
     return whole if abs(rate - whole) <= max(ROUND_RATE, rounding_s(time_s) / span) * rate else rate
+
+
+def may_be_rounded(time_s: FloatArray) -> bool:
+    """Whether stamps may be those of equal steps, written in so few digits that their steps differ.
+
+    All are multiples of one decimal, by which neither a step is off their mean nor a stamp off the line through the
+    first and the last.
+    """
+    decimal = next((of for of in _DECIMALS_S if _are_multiples(time_s, of)), None)
+    if decimal is None or not time_s[0] < time_s[-1]:
+        return False
+    even = np.linspace(time_s[0], time_s[-1], time_s.size)
+    strays = np.concatenate((time_s - even, np.diff(time_s - even)))
+    return bool((np.abs(strays) < decimal).all())
+
+
+def _are_multiples(time_s: FloatArray, decimal_s: float) -> bool:
+    with np.errstate(invalid="ignore"):  # stamps may run to infinity
+        parts = time_s / decimal_s
+        return bool((np.abs(parts - np.rint(parts)) <= 1e-6 + 4.0 * np.spacing(np.abs(parts))).all())

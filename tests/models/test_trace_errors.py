@@ -210,6 +210,32 @@ def test_steps_within_15_percent_of_their_median_are_accepted():
     assert raised.value.index == 11
 
 
+@pytest.mark.parametrize("digits", [3, 4])
+@pytest.mark.parametrize("start_s", [0.0, -0.01, 1_764_270_000.0])
+def test_stamps_that_may_be_rounded_are_refused_with_the_remedy(digits, start_s):
+    with pytest.raises(TraceError) as caught:
+        prepare(stamped(np.round(start_s + np.arange(100) / 3200.0, digits)))
+    assert caught.value.code == ("time-not-increasing" if digits == 3 else "time-jitter")
+    assert str(caught.value).endswith("; if they are rounded, give sample_rate_hz for them.")
+
+
+@pytest.mark.parametrize(
+    "time_s",
+    [
+        np.concatenate((stamps()[:50], stamps()[50:] + 0.002)),  # a gap of two whole samples
+        stamps(s99=np.inf),
+        stamps(s5=np.nan),
+        stamps(s5=0.0031),
+        np.round(stamps(s5=0.00523), 5),
+        np.zeros(100),
+    ],
+)
+def test_stamps_that_no_rounding_explains_are_refused_without_it(time_s):
+    with pytest.raises(TraceError) as caught:
+        prepare(stamped(time_s))
+    assert "rounded" not in str(caught.value)
+
+
 def test_one_moving_channel_is_enough():
     still = np.zeros((100, 3))
     assert prepare(Recording(angular_velocity=Signal(at(still, 50, 2, 0.1), "rad/s", 1e3))).kinematics.samples == 100

@@ -10,6 +10,7 @@ from headimpact_service.ingest.guard import GuardedLines, GuardedTable, guarded
 from headimpact_service.ingest.json_format import refuse_table_options
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.ndjson_format import read_lines
+from headimpact_service.ingest.no_signal import is_no_signal
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
@@ -96,7 +97,7 @@ class _Reading:
                 labels = {} if table.name is None else {"sheet": table.name}
                 yield item if isinstance(item, Problem) else _labelled(item, **labels)
         except Problem as problem:
-            if _is_unknown(problem):
+            if is_no_signal(problem):
                 self._unknown = self._unknown or problem
             elif table.name is None or problem.slug != "unreadable-file":
                 raise
@@ -108,10 +109,6 @@ class _Reading:
         """Refuse a file of which no table was read."""
         if self._count == 0:
             raise self._refused or self._unknown or Problem("unreadable-file", "The file holds no impact.")
-
-
-def _is_unknown(problem: Problem) -> bool:
-    return any(error.code == "layout-unknown" for error in problem.errors)
 
 
 def _as_preset_means(table: GuardedTable, options: ImportOptions) -> ImportOptions:

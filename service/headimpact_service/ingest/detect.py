@@ -27,11 +27,12 @@ class Kind(Enum):
 
 
 _BINARY = {
-    b"\x1f\x8b": "gzip",
-    b"\xd0\xcf\x11\xe0": "an old Excel workbook",
-    b"\x93NUMPY": "npy",
-    b"%PDF": "PDF",
+    b"\x1f\x8b": ("gzip", "unpack it, or send it alone as the body with Content-Encoding: gzip"),
+    b"\xd0\xcf\x11\xe0": ("an old Excel workbook", "save it as xlsx"),
+    b"\x93NUMPY": ("npy", "save its array in an npz (numpy.savez)"),
+    b"%PDF": ("PDF", "send the table that it was made from"),
 }
+"""What is known and not read, and what to do."""
 _READ_BINARY = {
     b"PAR1": Kind.PARQUET,
     b"ARROW1\0\0": Kind.ARROW,
@@ -87,9 +88,10 @@ def _refuse_binary(data: bytes) -> None:
             "This file is HDF5, as MATLAB writes with -v7.3, and is not read because its links can lead to other "
             f"files: save it with -v7. Files that are read: {READ}.",
         )
-    for magic, name in _BINARY.items():
+    for magic, (name, remedy) in _BINARY.items():
         if data.startswith(magic):
-            raise Problem("unsupported-media-type", f"This file is {name}; files that are read: {READ}.")
+            detail = f"This file is {name}: {remedy}. Files that are read: {READ}."
+            raise Problem("unsupported-media-type", detail)
     if b"\0" in data[:HEAD]:
         raise Problem("unsupported-media-type", f"The kind of this file is not known; files that are read: {READ}.")
 

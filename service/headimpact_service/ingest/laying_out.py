@@ -11,6 +11,7 @@ from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.layout import Clock, Component, Layout, SignalLayout
 from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS, DateAndTime, Mapping, SignalColumns
+from headimpact_service.ingest.no_signal import no_signal
 from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.supplied import Kind, Supplied, supplied_in
 
@@ -38,10 +39,7 @@ def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> L
         if laid is not None:
             signals[name] = laid
     if not signals:
-        raise layout_problem(
-            "The columns of no signal were found: name a preset, or send a mapping from columns to signals.",
-            code="layout-unknown",
-        )
+        raise no_signal()
     own = all(signal.clock for signal in signals.values())
     clock, *other_clocks = _clocks(mapping, headings, "time" in required, own=own) or [None]
     return Layout(

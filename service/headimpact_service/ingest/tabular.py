@@ -14,6 +14,7 @@ from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.laying_out import lay_out
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.mapping import Mapping, merge
+from headimpact_service.ingest.no_signal import is_no_signal, with_remedies
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.presets import (
@@ -115,10 +116,11 @@ def _laid_out(plan: Plan, headings: Headings) -> Layout:
     """The layout, or why there is none, with the preset whose columns these are unless one was named."""
     try:
         return lay_out(plan.mapping, headings, plan.required)
-    except Problem as problem:
+    except Problem as found:
+        problem = with_remedies(headings.written, plan.options, plan.format) if is_no_signal(found) else found
         names = [] if plan.options.preset is not None else fitting(headings, but=plan.preset)
         if not names:
-            raise
+            raise problem from None
         detail = f"{problem.detail} The headings are those of the preset {' or '.join(names)}: name it beside the file."
         [fault, *_] = problem.errors
         raise layout_problem(detail, code=fault.code, pointer=fault.pointer) from None

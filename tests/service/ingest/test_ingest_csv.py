@@ -59,6 +59,19 @@ def test_a_quoted_heading_may_hold_the_separator():
     np.testing.assert_array_equal(samples_of(one(heading)), six_axis())
 
 
+@pytest.mark.parametrize(
+    "above", ["Subject,17\nPeak,40.2,21.3\n", "A,B,C,D,E,F,G\n1,2,3,4,5,6,7\n\n", "Key,value\n" * 70]
+)
+def test_lines_above_that_hide_the_headings_are_refused_with_how_to_skip_them(above: str):
+    problem = refused(above + csv_text())
+    assert codes(problem) == [("mapping", "layout-unknown")]
+    assert 'a mapping says how many: {"skip_rows": ' in problem.detail
+    skipped = Mapping(skip_rows=above.count("\n"))
+    np.testing.assert_array_equal(samples_of(one(above + csv_text(), mapping=skipped)), six_axis())
+    wrong = refused(above + csv_text(), mapping=Mapping(skip_rows=0))
+    assert "skip_rows" not in wrong.detail
+
+
 def test_blocks_are_joined_in_order(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(csv_format, "ROWS_AT_ONCE", 7)
     samples = np.random.default_rng(2).normal(size=(50, 6))

@@ -164,6 +164,23 @@ def test_without_the_preset_no_unit_is_guessed():
     assert codes(refused(mat({"impacts": noise(1, 100)}))) == [("mapping", "layout-unknown")]
 
 
+@pytest.mark.parametrize("preset", [PRESET, None])
+def test_arrays_that_no_preset_reads_are_named_with_the_shape_that_is_wanted(preset: str | None):
+    two = {"impacts": noise(2), "nonimpacts": noise(2)}
+    for variables, columns in (
+        (two, "impacts_1 to impacts_6, nonimpacts_1 to nonimpacts_6"),
+        ({"impacts": noise(2).transpose(1, 2, 0)}, "impacts_1 to impacts_2"),
+        ({"impacts": np.zeros((2, 40, 9))}, "impacts_1 to impacts_9"),
+    ):
+        problem = refused(mat(variables), preset=preset)
+        assert codes(problem) == [("mapping", "layout-unknown")]
+        assert f"The file has the columns {columns};" in problem.detail
+        assert "an array impacts x samples x components has one for each component" in problem.detail
+        assert ("name a preset" in problem.detail) == (preset is None)
+    mapping = {"linear_acceleration": {"unit": "g"} | {a: f"impacts_{n}" for n, a in enumerate("xyz", 1)}}
+    assert len(records(mat(two), mapping=Mapping.model_validate(mapping | {"sample_rate_hz": 1000}))) == 2
+
+
 def test_many_impacts_come_block_by_block():
     values = noise(400, 100)
     found = records(mat({"a": values}), preset=PRESET)

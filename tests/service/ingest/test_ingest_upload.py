@@ -47,7 +47,7 @@ def test_every_kind_has_its_reader():
 @pytest.mark.parametrize(
     ("data", "named"),
     [
-        (gzip.compress(b"a,b\n", mtime=0), "gzip"),
+        (gzip.compress(b"a,b\n", mtime=0), "gzip: unpack it"),
         (b"\x89HDF\r\n\x1a\n", "save it with -v7"),
         (b"\0" * 512 + b"\x89HDF\r\n\x1a\n", "HDF5"),
         (b"MATLAB 7.3 MAT-file, Platform: x", "save it with -v7"),
