@@ -40,7 +40,8 @@ def with_unread(layout: Layout, table: Table) -> Layout:
     """The layout, with the columns beside it that may tell several impacts from one."""
     if layout.sample_number is not None:
         return layout
-    passed = {*layout.numbers, *layout.texts, *table.wordless}
+    clocks = {other.column for other in layout.others.clocks} - {*table.wordless}  # looked at as text, too
+    passed = {*layout.numbers, *layout.texts, *table.wordless} - clocks
     return replace(
         layout, unread=unread_columns(layout.headings, passed, timed=layout.is_timed, keyed=bool(layout.keys))
     )

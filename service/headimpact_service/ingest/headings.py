@@ -11,7 +11,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest import mapping as mappings
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.spelling import MAX_COMPACT, compact, unit_at_end, unit_ending, unit_spelled
-from headimpact_service.ingest.time_headings import sensor_of_times, unit_of_times
+from headimpact_service.ingest.time_headings import may_be_times, sensor_of_times, unit_of_times
 
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 
@@ -212,7 +212,7 @@ class Vocabulary:
         """The columns of times that name one signal's sensor, as a time of the gyroscope."""
         found: dict[SignalName, list[mappings.TimeColumn]] = {}
         for column, heading in enumerate(headings.written):
-            signal = sensor_of_times(heading)
+            signal = sensor_of_times(heading) if may_be_times(heading) else None
             dates = mappings.DATES_IN if column in headings.dated else None
             unit = dates or unit_of_times(heading, headings.units.get(column))
             if unit is not None and signal is not None:

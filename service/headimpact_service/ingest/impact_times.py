@@ -14,6 +14,7 @@ from headimpact_service.ingest.cells import number_said
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.labels import Reading
 from headimpact_service.ingest.layout import Clock, SignalLayout
+from headimpact_service.ingest.mapping import TIME_UNITS
 from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
@@ -25,6 +26,8 @@ from headimpact_service.ingest.windows import Rows, numbers_of
 OTHER_CLOCK = 0.02
 """Relative: how far the rate of times that are not read may be from a signal's, being another clock's."""
 MIN_STAMPS = 3
+MOST_ROUNDING = 0.1
+"""Of a rate: times that are rounded by more say none."""
 
 
 class ImpactTimes:
@@ -114,7 +117,11 @@ class ImpactTimes:
         first = self.layout.clock
         if first is None:
             return []
-        others = [Clock(one.column, one.milliseconds) for one in self.layout.others.clocks if one.may_count]
+        others = [
+            Clock(one.column, one.milliseconds)
+            for one in self.layout.others.clocks
+            if one.may_count and one.milliseconds is not None
+        ]
         alike = (one for one in others if go_on_alike(self._times_ms(first), self._times_ms(one)))
         return [*self.layout.clocks, *filter(self._has_trigger, alike)]
 
@@ -160,16 +167,19 @@ class ImpactTimes:
         if shared is not None and all(signal.is_apart for signal in self.layout.signals.values()):
             self._require_among(shared.column, shared.milliseconds, "of the shared times", rates)
 
-    def _require_among(self, column: int, milliseconds: float, heading: str, rates: list[float]) -> None:
-        """Refuse times of a rate that no signal has; what does not go on from row to row is no time of samples."""
-        stamps = self.samples.numbers[column][self.rows] * milliseconds
-        stamps = stamps[np.isfinite(stamps)]
-        if stamps.size < MIN_STAMPS or not (np.diff(stamps) > 0.0).all():
+    def _require_among(self, column: int, milliseconds: float | None, heading: str, rates: list[float]) -> None:
+        """Refuse times of a rate that no signal has; what does not go on from row to row is no time of samples.
+
+        Times in no known unit may be in any, and what counts the rows one by one is none.
+        """
+        stamps = _there(self.samples.numbers[column][self.rows])
+        steps = np.diff(stamps)
+        if stamps.size < MIN_STAMPS or not (steps > 0.0).all() or (milliseconds is None and (steps == 1.0).all()):
             return
-        span = float(stamps[-1] - stamps[0])
-        said = 1000.0 * (stamps.size - 1) / span
-        if not _is_among(said, rates, OTHER_CLOCK + rounded_to(stamps) / span):
-            raise _other(heading, said)
+        units = TIME_UNITS.values() if milliseconds is None else [milliseconds]
+        said = [_rate_and_rounding(stamps * unit) for unit in units]
+        if not any(_is_among(rate, rates, OTHER_CLOCK + rounding) for rate, rounding in said):
+            raise _other(heading, said[0][0])
 
     def require_going_on(self, track: Track, parting: Callable[[], str]) -> None:
         """Refuse times that begin anew: the rows are of several impacts; `parting` says what may tell them apart."""
@@ -232,6 +242,12 @@ class ImpactTimes:
         if before and after:
             return min(after) - min(before)
         return min((1000.0 * self.mapping.drop_rows / track.rate for track in kept if track.rate), default=0.0)
+
+
+def _rate_and_rounding(stamps_ms: FloatArray) -> tuple[float, float]:
+    """Samples per second of times on average, and how far their rounding may take it off, relative; less than all."""
+    span = float(stamps_ms[-1] - stamps_ms[0])
+    return 1000.0 * (stamps_ms.size - 1) / span, min(rounded_to(stamps_ms) / span, MOST_ROUNDING)
 
 
 def _is_among(said: float, rates: list[float], apart: float) -> bool:

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS
 from headimpact_service.ingest.spelling import compact
-from headimpact_service.ingest.time_headings import hertz_of_rates, unit_of_times
+from headimpact_service.ingest.time_headings import hertz_of_rates, may_be_times, unit_of_times
 
 
 @dataclass(frozen=True, slots=True)
 class OtherClock:
-    """A column of stamps that no signal is read by; `milliseconds` are those of one unit of them.
+    """A column of stamps that no signal is read by; `milliseconds` are those of one unit of them, if it is known.
 
     One whose heading is a word for the samples' times `may_count`, if it goes on as they do.
     """
 
     column: int
     heading: str
-    milliseconds: float
+    milliseconds: float | None
     may_count: bool
 
 
@@ -66,9 +66,10 @@ def other_times(
     for column, heading in enumerate(headings.written):
         if column in read:
             continue
-        unit = DATES_IN if column in headings.dated else unit_of_times(heading, headings.units.get(column))
-        if unit is not None and has_samples(column):
-            clocks.append(OtherClock(column, heading, TIME_UNITS[unit], column in times))
+        is_dated = column in headings.dated
+        if (is_dated or may_be_times(heading)) and has_samples(column):
+            unit = DATES_IN if is_dated else unit_of_times(heading, headings.units.get(column))
+            clocks.append(OtherClock(column, heading, None if unit is None else TIME_UNITS[unit], column in times))
         elif (hertz := hertz_of_rates(heading, headings.units.get(column), fs_is_rate=fs_is_rate)) is not None:
             rates.append(OtherRate(column, heading, hertz))
     return OtherTimes(tuple(clocks), tuple(rates))

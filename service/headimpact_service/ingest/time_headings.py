@@ -16,7 +16,24 @@ _INSIDE = frozenset(
 )
 """Units of time that mean one wherever they stand in a heading; a lone `s` may be a part of another unit."""
 _RATES = frozenset(
-    {"rate", "frequency", "freq", "fs", "hz", "khz", "dt", "step", "interval", "period", "tvec", "tms", "ts"}
+    {
+        *(
+            "rate",
+            "srate",
+            "frequency",
+            "freq",
+            "freqs",
+            "fs",
+            "fsamp",
+            "fsample",
+            "hz",
+            "khz",
+            "sr",
+            "odr",
+            "sampling",
+        ),
+        *("dt", "step", "timestep", "interval", "period", "tvec", "tms", "ts", "tt", "timebase"),
+    }
 )
 _RATE = frozenset({"rate", "frequency", "freq"})
 _OF_SAMPLES = frozenset({"sample", "samples", "sampling", "acquisition"})
@@ -45,17 +62,21 @@ _ANY_SENSOR = frozenset[str]().union(*_SENSORS.values())
 def speaks_of_times(heading: str) -> bool:
     """Whether a heading may be that of times or of a rate of the samples, in whatever unit."""
     words = _words(heading)
-    return bool(words & (_TIMES | _RATES)) and not words & _NOT_OF_SAMPLES
+    return bool(words & (_TIMES | _RATES | _INSIDE)) and not words & _NOT_OF_SAMPLES
+
+
+def may_be_times(heading: str) -> bool:
+    """Whether a heading may be that of times: it speaks of them, or of a signal's sensor with a unit of time."""
+    words = _words(heading)
+    if words & _NOT_OF_SAMPLES:
+        return False
+    spoken = bool(words & (_TIMES | _INSIDE)) or any(map(_TIME_OF_ONE.fullmatch, words))
+    return spoken or (bool(words & _ANY_SENSOR) and unit_of_times(heading, None) is not None)
 
 
 def unit_of_times(heading: str, beside: str | None) -> str | None:
-    """The unit of the times that a column may hold, as its heading and the unit beside it say; None where it does not.
-
-    The heading may be any that names a unit of time and speaks of times or of a signal's sensor.
-    """
+    """The unit of time that a heading names, or that stands beside it."""
     words = _words(heading)
-    if words & _NOT_OF_SAMPLES or not (words & (_TIMES | _ANY_SENSOR) or any(map(_TIME_OF_ONE.fullmatch, words))):
-        return None
     inside = next((word for word in _listed(heading) if word in _INSIDE), None)
     at_end = None if words & _OF_SIGNALS - {"x", "y"} else unit_ending("time", heading)
     return unit_spelled("time", beside) or at_end or unit_spelled("time", inside)
@@ -76,6 +97,8 @@ def hertz_of_rates(heading: str, beside: str | None, *, fs_is_rate: bool) -> flo
     words = _words(heading) | _words(beside or "")
     if words & (_NOT_OF_SAMPLES | _OF_SIGNALS):
         return None
+    if len(words) == 1 and words & (_RATE | {"hz", "fs", "srate", "fsamp", "fsample"}):
+        return 1.0
     in_hertz = "hz" in words and words & (_OF_SAMPLES | _ANY_SENSOR | _RATE | {"fs"})
     of_one = words & _ANY_SENSOR and (words & _RATE or (fs_is_rate and "fs" in words))
     if in_hertz or of_one or (words & _RATE and words & _OF_SAMPLES) or words & _ALONE or {"samples", "per"} <= words:

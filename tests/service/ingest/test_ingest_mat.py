@@ -225,6 +225,21 @@ SIGNALS = {
 class TestRates:
     """What a file itself says of its rate goes before what its laboratory's files usually have."""
 
+    @pytest.mark.parametrize("name", ["t_gyro", "t_ang", "time_ang_vel", "t_w", "tg"])
+    def test_times_of_one_sensor_in_a_struct_are_not_passed_over(self, name: str):
+        values = noise(1, 100)[0]
+        fields = {"t": TIMES_S[:, None], "lin_acc_CG": values[:, :3], "ang_vel": values[:, 3:]}
+        other = structs(fields | {name: TIMES_S[:, None] / 2.0})
+        assert codes(refused(mat({"impact": other}), preset=PRESET)) == [("sample_rate_hz", "rate-differs")]
+        alike = structs(fields | {name: TIMES_S[:, None] * 1000.0})
+        (record,) = records(mat({"impact": alike}), preset=PRESET)
+        assert record.recording.angular_velocity.sample_rate_hz == 1000.0
+
+    @pytest.mark.parametrize("name", ["srate", "sr", "fsamp", "ODR", "sampling", "timestep", "tt", "timebase", "ms"])
+    def test_a_rate_by_another_name_is_not_replaced_by_the_usual_one(self, name: str):
+        problem = refused(mat({"impacts": noise(3, 100), name: 2000.0}), preset=PRESET)
+        assert codes(problem) == [("sample_rate_hz", "rate-unclear")]
+
     @pytest.mark.parametrize(
         "beside",
         [
