@@ -11,7 +11,9 @@ from headimpact_service.ingest.cells import NOTHING
 
 _WHOLE = r"(?:0|[1-9][0-9]{0,14})\.0"
 """A whole number as a data frame writes it that also has empty cells in its column."""
-_OTHERWISE = re.compile(rf"'*(?:{'|'.join(map(re.escape, sorted(NOTHING - {''})))}|{_WHOLE})", re.IGNORECASE)
+_WORDS = "|".join(map(re.escape, sorted(NOTHING - {""})))
+_OTHERWISE = re.compile(rf"'*\s*(?:{_WORDS}|{_WHOLE})\s*", re.IGNORECASE)
+"""Also between blanks, which readers of tables take off."""
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")
 """What needs the guard: also a cell that looks as if it had one, so that each comes back as it went."""
 
