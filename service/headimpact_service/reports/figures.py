@@ -106,10 +106,10 @@ def discrimination_curves(found: Refit) -> str:
             ylim=(0, 1.02),
             title="Precision-recall, with average precision",
         )
-        roc.legend(loc="lower right", fontsize=7.5)
-        pr.legend(loc="lower left", fontsize=7.5)
+        for ax in axes:  # below: curves of few events go through every corner
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), fontsize=7.5)
 
-    return _svg(draw, 2, (9.2, 4.3))
+    return _svg(draw, 2, (9.2, 5.2))
 
 
 def logistic_curve(one: CriterionRefit, found: Refit) -> str:

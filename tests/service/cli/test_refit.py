@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -141,6 +142,19 @@ class TestOfTheFixture:
         for told in ("27 concussions leave", "Model card", "not a diagnosis", "sha256:", "more motion lowers"):
             assert told in page
         assert page.count("<svg") >= 12
+
+    def test_what_the_curves_are_stands_below_them(self, done: Path) -> None:
+        drawn = next(part for part in (done / "report.html").read_text().split("<svg") if "Precision-recall" in part)
+        panels = drawn.split('<g id="axes_')[1:]
+        assert len(panels) == 2
+        for panel in panels:
+            frame, legend = panel.split('<g id="legend_')
+            path = re.search(r'<g id="patch_[0-9]+">\s*<path d="([^"]*)"', frame)
+            assert path is not None
+            bottom = max(map(float, re.findall(r"[ML] \S+ (\S+)", path[1])))
+            named = [float(y) for y in re.findall(r'<text [^>]*\by="([0-9.]+)"', legend)]
+            assert len(named) == 4
+            assert min(named) > bottom
 
     def test_the_same_table_in_another_order_gives_the_same_numbers(self, tmp_path: Path, run: Run) -> None:
         columns = flat_export()
