@@ -27,13 +27,13 @@ from headimpact.kinematics import (
     transfer_to_head_cg,
 )
 from headimpact.plan import Group, Plan, channels_of, plan_of
-from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import (
     QualityNote,
     check_angular_acceleration,
     check_channels,
     check_cut_off,
     check_identical,
+    highest_of,
     words,
 )
 from headimpact.record_rules import (
@@ -297,7 +297,7 @@ def _computed_out_of_range(plan: Plan, motion: Motion) -> dict[int, TraceError]:
 def _beyond(motion: Motion, name: SignalName) -> list[int]:
     """The places of the impacts that a signal's bound refuses."""
     largest = motion.magnitudes[motion.signals.index(name)].max(axis=0)
-    places: list[int] = np.flatnonzero(largest > QUALITY_LIMITS[name]["refused"]).tolist()
+    places: list[int] = np.flatnonzero(largest > highest_of(name, "refused")).tolist()
     return places
 
 

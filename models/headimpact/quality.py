@@ -75,6 +75,17 @@ class Channel:
     declared_range: float
 
 
+def highest_of(signal: str, kind: Literal["extreme", "refused"]) -> float:
+    """The largest magnitude of a signal within a bound, which is allowed itself in whatever unit it was sent."""
+    return float(QUALITY_LIMITS[signal][kind] * (1.0 + QUALITY_LIMITS["conversion"]["rounding"]))
+
+
+def near_full_scale(declared_range: float) -> float:
+    """The least magnitude that is near a sensor's full scale, in whatever unit either was sent."""
+    fraction = QUALITY_LIMITS["saturation"]["range_fraction"]
+    return float(fraction * declared_range * (1.0 - QUALITY_LIMITS["conversion"]["rounding"]))
+
+
 def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: bool) -> Iterator[QualityNote]:
     """Notes on single channels as sent.
 
@@ -99,7 +110,7 @@ def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: 
 def _extreme_values(channels: Sequence[Channel], peaks: FloatArray) -> Iterator[QualityNote]:
     for channel, peak in zip(channels, peaks.tolist(), strict=True):
         bound = QUALITY_LIMITS[channel.signal]["extreme"]
-        if peak > bound:
+        if peak > highest_of(channel.signal, "extreme"):
             yield _warning(
                 "extreme_value",
                 channel,
@@ -123,9 +134,7 @@ def _constant_channels(channels: Sequence[Channel], samples: FloatArray) -> Iter
 
 def _saturated(channels: Sequence[Channel], magnitude: FloatArray, peaks: FloatArray) -> Iterator[QualityNote]:
     """Runs of equal samples at the largest value or within 5 % of the declared range."""
-    limits = QUALITY_LIMITS["saturation"]
-    ranges = np.array([channel.declared_range for channel in channels])
-    level = np.minimum(peaks, limits["range_fraction"] * ranges)
+    level = np.minimum(peaks, [near_full_scale(channel.declared_range) for channel in channels])
     repeated = (magnitude[1:] == magnitude[:-1]) & (magnitude[1:] >= level)
     # a run of three equal samples is two equal pairs in a row
     runs = repeated[1:] & repeated[:-1]
@@ -135,7 +144,7 @@ def _saturated(channels: Sequence[Channel], magnitude: FloatArray, peaks: FloatA
     for column in np.flatnonzero(runs.any(axis=0) & moving).tolist():
         channel = channels[column]
         # a sample belongs to a run that starts at it or at one of the two before it
-        count = np.count_nonzero(np.convolve(runs[:, column], np.ones(limits["run"])))
+        count = np.count_nonzero(np.convolve(runs[:, column], np.ones(QUALITY_LIMITS["saturation"]["run"])))
         yield _warning(
             "saturated",
             channel,

@@ -14,7 +14,7 @@ from headimpact.errors import TraceError
 from headimpact.gaps import fill_gaps
 from headimpact.kinematics import FloatArray
 from headimpact.published import QUALITY_LIMITS
-from headimpact.quality import AXES, words
+from headimpact.quality import AXES, highest_of, words
 from headimpact.recording import TO_CRITERIA_UNIT, Recording, Signal, SignalName
 from headimpact.stamps import is_like, may_be_rounded, rate_said
 
@@ -138,14 +138,15 @@ def _if_rounded(time_s: FloatArray) -> str:
 
 def require_within(name: SignalName, values: FloatArray) -> None:
     """Refuse samples that no head survives to send: they are another unit or a broken channel."""
-    bound = QUALITY_LIMITS[name]["refused"]
+    bound = highest_of(name, "refused")
     if values.max() > bound or values.min() < -bound:
         raise next(_beyond(name, values))
 
 
 def _beyond(name: SignalName, values: FloatArray) -> Iterator[TraceError]:
     bound = QUALITY_LIMITS[name]["refused"]
-    for index, axis in np.argwhere((np.abs(values) > bound) & np.isfinite(values)):
+    highest = highest_of(name, "refused")
+    for index, axis in np.argwhere((np.abs(values) > highest) & np.isfinite(values)):
         yield TraceError(
             "value-out-of-range",
             f"The {words(name)} must stay within {bound:g} {UNITS_OF[name][0]}; check the unit it was sent in.",

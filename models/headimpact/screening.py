@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from headimpact.published import QUALITY_LIMITS
-from headimpact.quality import Channel
+from headimpact.quality import Channel, highest_of, near_full_scale
 from headimpact.recording import FloatArray
 
 BoolArray = NDArray[np.bool_]
@@ -41,11 +41,10 @@ class Screen:
     @classmethod
     def of(cls, channels: Sequence[Channel]) -> Screen:
         """The screen of these channels."""
-        fraction = QUALITY_LIMITS["saturation"]["range_fraction"]
         linear = np.array([channel.signal == "linear_acceleration" for channel in channels])
         return cls(
-            np.array([[QUALITY_LIMITS[channel.signal]["extreme"]] for channel in channels]),
-            np.array([[fraction * channel.declared_range] for channel in channels]),
+            np.array([[highest_of(channel.signal, "extreme")] for channel in channels]),
+            np.array([[near_full_scale(channel.declared_range)] for channel in channels]),
             np.flatnonzero(linear),
             np.flatnonzero(~linear),
         )

@@ -102,6 +102,21 @@ def test_the_declared_range_is_in_the_unit_of_its_signal():
     assert [note.channel for note in notes(clipped, "saturated")] == ["y"]
 
 
+def test_samples_that_are_5_percent_under_the_range_are_saturation_in_every_unit():
+    # 0.95 * 100 is 95; in m/s^2 and back either may come out a hair less
+    for unit, size in (("g", 1.0), ("m/s^2", 9.80665)):
+        for full in np.arange(80.0, 120.0):
+            x = at(A, 60, 1, 0.99 * full) * size
+            x[40:43, 1] = 0.95 * full * size
+            signal = Signal(x, unit, 1e3, declared_range=full * size)
+            assert len(notes(Recording(linear_acceleration=signal), "saturated")) == 1
+
+
+def test_a_value_at_the_bound_of_extreme_ones_earns_no_note_in_another_unit():
+    x = np.rad2deg(at(ALPHA, 40, 1, 25_000.0))
+    assert notes(recording(angular_acceleration=Signal(x, "deg/s^2", 1e3)), "extreme_value") == []
+
+
 @pytest.mark.parametrize(("end", "index"), [("first", 0), ("last", -1)])
 @pytest.mark.parametrize(("ratio", "noted"), [(5.01, True), (4.99, False)])
 def test_an_edge_sample_far_off_its_neighbours_is_a_glitch(end, index, ratio, noted):

@@ -175,7 +175,29 @@ def test_a_value_at_its_bound_is_still_accepted(name, unit, bound):
         changed = recording(low_pass=NO_FILTER, **{name: Signal(at(x, 50, 1, value), unit, 1e3)})
         assert prepare(changed).kinematics.samples == 100
     with pytest.raises(TraceError, match=f"{bound:g}"):
-        prepare(recording(**{name: Signal(at(x, 50, 1, np.nextafter(bound, np.inf)), unit, 1e3)}))
+        prepare(recording(**{name: Signal(at(x, 50, 1, bound * (1.0 + 1e-11)), unit, 1e3)}))
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "value"),
+    [
+        ("linear_acceleration", "m/s^2", 1000.0 * 9.80665),
+        ("angular_velocity", "deg/s", np.degrees(200.0)),
+        ("angular_acceleration", "deg/s^2", 11459155.902616465),  # 200 000 rad/s^2, and by its conversion a hair more
+        ("angular_acceleration", "rad/s^2", 11459155.902616465 * np.radians(1.0)),
+    ],
+)
+@pytest.mark.parametrize("time", [{"sample_rate_hz": 1e3}, {"time_s": stamps()}])
+def test_a_value_at_its_bound_is_accepted_in_every_unit(name, unit, value, time):
+    x = {"linear_acceleration": A, "angular_velocity": W, "angular_acceleration": ALPHA}[name]
+    for sign in (1.0, -1.0):
+        given = recording(low_pass=NO_FILTER, **{name: Signal(at(x, 50, 1, sign * value), unit, **time)})
+        assert prepare(given).kinematics.samples == 100
+        assert list(broken_rules(given)) == []
+    beyond = recording(**{name: Signal(at(x, 50, 1, value * (1.0 + 1e-11)), unit, **time)})
+    with pytest.raises(TraceError, match="must stay within"):
+        prepare(beyond)
+    assert [fault.code for fault in broken_rules(beyond)] == ["value-out-of-range"]
 
 
 def test_an_integral_at_its_bound_is_still_accepted_and_one_of_a_block_is_refused_alone():
