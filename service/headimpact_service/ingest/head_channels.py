@@ -11,7 +11,7 @@ import numpy as np
 
 from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote, check_reported_resultant, words
-from headimpact.recording import AXES, SIGNALS, SignalName
+from headimpact.recording import AXES, SIGNALS, TO_CRITERIA_UNIT, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, check_cut, check_twice, head_recording
 from headimpact_service.ingest.file_faults import file_fault
@@ -161,13 +161,16 @@ class _Head:
                 raise file_fault(detail, "missing-sample")
 
     def _compare_resultant(self, signal: SignalName, unit: str, values: np.ndarray[Any, np.dtype[np.float64]]) -> None:
-        """The resultant that the file supplies, against the one of its samples."""
+        """The resultants that the file supplies and lets stand, of axes filtered as they are, against the samples'."""
+        strengths = {channel.code.strength for channel in self.used if channel.code.signal == signal}
         for channel in self.channels:
-            if channel.code.signal != signal or channel.code.axis != RESULTANT:
+            of_signal = channel.code.signal == signal and channel.code.axis == RESULTANT
+            if not of_signal or channel.invalid is not None or strengths != {channel.code.strength}:
                 continue
             curve = channel.read()
-            if curve.unit == unit and curve.values.size == values.shape[0]:
-                self.notes += check_reported_resultant(signal, unit, curve.values, values)
+            if curve.values.size == values.shape[0]:
+                reported = curve.values * (TO_CRITERIA_UNIT[curve.unit] / TO_CRITERIA_UNIT[unit])
+                self.notes += check_reported_resultant(signal, unit, reported, values)
 
     def _note(self, code: str, detail: str, channel: HeadChannel) -> None:
         self.notes.append(QualityNote(code, "warning", detail, channel.code.signal, channel.code.axis))

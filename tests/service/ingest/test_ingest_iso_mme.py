@@ -280,6 +280,24 @@ def test_a_supplied_resultant_is_compared_with_the_three_axes():
     assert [note.code for note in wrong.notes] == ["vendor_peak_mismatch"]
 
 
+@pytest.mark.parametrize(
+    ("code", "unit", "factor", "changes", "noted"),
+    [
+        ("11HEADCG00H3ACRA", "m/s2", 1.1 * 9.80665, {}, True),
+        ("11HEADCG00H3ACRA", "m/s2", 9.80665, {}, False),
+        ("11HEADCG00H3ACRC", "g", 1.1, {}, False),  # of axes that were filtered otherwise
+        ("11HEADCG00H3ACRA", "g", 1.1, {"Data status": "channel failed"}, False),
+    ],
+)
+def test_a_resultant_of_its_own_samples_is_compared_in_their_unit(
+    code: str, unit: str, factor: float, changes: dict[str, str], noted: bool
+):
+    waves = np.stack([half_sine(SAMPLES, peak) for peak in (30.0, -12.0, 7.5)])
+    sent = channel(code, unit, (factor * np.linalg.norm(waves, axis=0)).tolist(), **changes)
+    record = one(iso_mme(channels() | {code: sent}))
+    assert [note.code for note in record.notes] == (["vendor_peak_mismatch"] if noted else [])
+
+
 def test_a_full_scale_in_the_headers_tells_clipping():
     held = channels(channel_amplitude_class="200")
     assert one(iso_mme(held)).recording.linear_acceleration.declared_range == 200.0
