@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.layout import Layout
-from headimpact_service.ingest.other_times import other_times
+from headimpact_service.ingest.other_times import other_times, stated_above
 from headimpact_service.ingest.presets import times_of
 from headimpact_service.ingest.supplied import spoken_in
 from headimpact_service.ingest.table import Table
@@ -16,7 +16,8 @@ from headimpact_service.ingest.unread import unread_columns
 def with_other_times(layout: Layout, headings: Headings, table: Table) -> Layout:
     """The layout, with the columns beside it that may say other times."""
     read = {*layout.numbers, *layout.texts}
-    return replace(layout, others=other_times(headings, read, table.has_samples, times_of(headings)))
+    others = other_times(headings, read, table.has_samples, times_of(headings))
+    return replace(layout, others=replace(others, stated=tuple(stated_above(table.above))))
 
 
 def with_supplied(layout: Layout, headings: Headings, table: Table) -> Layout:

@@ -89,7 +89,8 @@ class CsvTable:
         self._decimal_points = text.has_decimal_points(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
         headings = self._rows(reader, 1)[0]
-        self.headings: tuple[str, ...] = tuple(joined(cells_of(above, self._delimiter), headings))
+        self.above = [cells_of(line, self._delimiter) for line in above]
+        self.headings: tuple[str, ...] = tuple(joined(self.above[-1] if above else [], headings))
         self._repeated = [heading.strip() for heading in headings]
         self.units: Mapping[int, str] = self._read_units(reader) if has_units else {}
         self._simply_quoted = _simply_quoted(self._delimiter)
@@ -113,15 +114,14 @@ class CsvTable:
                 spaced_apart=self._blank_lines.part_rows,
             )
 
-    def _find_headings(self, skip_rows: int) -> tuple[str, str, bool]:
-        """The line above the headings, these, and whether units follow them; the lines further above are gone."""
+    def _find_headings(self, skip_rows: int) -> tuple[list[str], str, bool]:
+        """The lines above the headings, these, and whether units follow them."""
         first = self._first_line(skip_rows)
         ahead = [first, *islice(self._lines, LOOK)]
         top = top_of(ahead, search=not skip_rows)
         self._lines = chain(ahead[top.heading + 1 :], self._lines)
         self._line += top.heading
-        above = ahead[top.heading - 1] if top.heading else ""
-        return above, self._whole(ahead[top.heading]), top.has_units
+        return ahead[: top.heading], self._whole(ahead[top.heading]), top.has_units
 
     def _whole(self, line: str) -> str:
         """A line with those on which a quoted cell of it goes on."""

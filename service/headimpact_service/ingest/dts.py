@@ -251,6 +251,7 @@ class _Channels:
     parted = False
     dated = frozenset[int]()
     wordless = frozenset[int]()
+    above: Sequence[Sequence[str]] = ()
 
     def __init__(self, data: _Data) -> None:
         """Headings are the channels' codes or, where they have none, their names."""

@@ -108,6 +108,8 @@ class Worker:
 class GuardedTable:
     """A table that the parsing process reads: see :class:`headimpact_service.ingest.table.Table`."""
 
+    above: Sequence[Sequence[str]] = ()
+
     def __init__(self, reading: Reading, fields: Frame) -> None:
         """A table as its headings were announced."""
         self._reading = reading

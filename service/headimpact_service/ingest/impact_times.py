@@ -161,6 +161,9 @@ class ImpactTimes:
             said = number_said(distinct[0]) if len(distinct) == 1 else None
             if said is not None and not _is_among(said * other_rate.hertz, rates, OTHER_CLOCK):
                 raise _other(other_rate.heading, said * other_rate.hertz)
+        for name, stated in self.layout.others.stated:
+            if not _is_among(stated, rates, OTHER_CLOCK):
+                raise _other(name, stated, what="line")
         for other in self.layout.others.clocks:
             self._require_among(other.column, other.milliseconds, other.heading, rates)
         shared = self.clock
@@ -254,9 +257,9 @@ def _is_among(said: float, rates: list[float], apart: float) -> bool:
     return any(abs(said - rate) <= apart * rate for rate in rates)
 
 
-def _other(heading: str, rate: float) -> Problem:
+def _other(heading: str, rate: float, what: str = "column") -> Problem:
     return file_fault(
-        f"The column {heading} says {rate:.5g} samples per second, at which no signal is read. If it is one sensor's, "
+        f"The {what} {heading} says {rate:.5g} samples per second, at which no signal is read. If it is one sensor's, "
         'say so in a mapping, as {"angular_velocity": {"time": {"column": ..., "unit": ...}}} or {"angular_velocity": '
         '{"sample_rate_hz": ...}}. If it is of something else, name the times that count in the mapping, as {"time": '
         '{"column": ..., "unit": ...}}, or say {"time": null} in it where a rate counts.',

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
+from headimpact_service.ingest.cells import number_said
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS
 from headimpact_service.ingest.spelling import compact
@@ -39,9 +40,21 @@ class OtherTimes:
 
     clocks: tuple[OtherClock, ...] = ()
     rates: tuple[OtherRate, ...] = ()
+    stated: tuple[tuple[str, float], ...] = ()
+    """What rows above the headings are called that state a sample rate, and the rate [Hz]."""
 
 
 NO_OTHERS = OtherTimes()
+
+
+def stated_above(rows: Sequence[Sequence[str]]) -> Iterator[tuple[str, float]]:
+    """The sample rates that rows above the headings state: a name, and a number in the cell behind it."""
+    for row in rows:
+        name, *cells = [cell.strip() for cell in row] or [""]
+        hertz = hertz_of_rates(name, None, fs_is_rate=True)
+        said = next((number for cell in cells if (number := number_said(cell)) is not None), None)
+        if hertz is not None and said is not None:
+            yield name, said * hertz
 
 
 def other_times(

@@ -49,6 +49,10 @@ class Table(Protocol):
         """Whether the format itself parts the impacts, so that every block has `lengths`."""
 
     @property
+    def above(self) -> Sequence[Sequence[str]]:
+        """The rows of cells above the headings, as far as the format gives them."""
+
+    @property
     def wordless(self) -> Collection[int]:
         """Columns whose cells cannot be read as text."""
 

@@ -303,3 +303,17 @@ def test_a_rate_is_held_against_dates_of_any_name(heading: str):
     text = table([heading, *SIX], rows)
     assert codes(refused(text, sample_rate_hz=1000.0)) == [("sample_rate_hz", "rate-differs")]
     assert rates(one(text, sample_rate_hz=2000.0)) == [2000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    "line", ["Sample rate (Hz),2000", "Sampling Frequency,2000,Hz", "fs,2000", "Sampling rate [kHz],2"]
+)
+def test_a_rate_that_a_line_above_the_headings_states_is_held_against_the_one_beside_the_file(line: str):
+    below = table(SIX, six_axis().tolist())
+    text = f"Device,MG 7\n{line}\n".encode() + below
+    problem = refused(text, sample_rate_hz=1000.0)
+    assert codes(problem) == [("sample_rate_hz", "rate-differs")]
+    assert "The line" in problem.detail
+    assert rates(one(text, sample_rate_hz=2000.0)) == [2000.0, 2000.0]
+    filtered = b"Device,MG 7\nFilter frequency (Hz),300\n" + below
+    assert rates(one(filtered, sample_rate_hz=1000.0)) == [1000.0, 1000.0]

@@ -53,6 +53,7 @@ class ArrayTable:
 
     parted = True
     dated = frozenset[int]()
+    above: Sequence[Sequence[str]] = ()
 
     def __init__(self, samples: Sequence[Samples], facts: Sequence[Fact], units: dict[str, str]) -> None:
         """Samples with times first, so that a signal's own times stand before it; `units` by the array's name."""

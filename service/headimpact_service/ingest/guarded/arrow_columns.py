@@ -45,6 +45,8 @@ def is_list_of_numbers(kind: pa.DataType) -> bool:
 class ArrowTable:
     """A table over batches of Arrow columns."""
 
+    above: Sequence[Sequence[str]] = ()
+
     def __init__(self, schema: pa.Schema, batches: Batches) -> None:
         """Look at the schema, and for times that are text at the first rows."""
         self.headings = checked_headings(schema.names)

@@ -27,6 +27,7 @@ class StructTable:
 
     parted = True
     dated = frozenset[int]()
+    above: Sequence[Sequence[str]] = ()
     units: dict[int, str] = {}  # noqa: RUF012 - a MATLAB file says none
 
     def __init__(self, impacts: Sequence[dict[str, Any]]) -> None:

@@ -104,6 +104,7 @@ class SheetTable:
 
     parted = False
     wordless = frozenset[int]()
+    above: Sequence[Sequence[str]] = ()
 
     def __init__(self, blocks: list[_Block]) -> None:
         """Headings of all blocks, in their order."""
