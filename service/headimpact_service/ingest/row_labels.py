@@ -101,7 +101,7 @@ class RowLabels:
 
     def _require_counted(self) -> None:
         """Refuse samples that are left out, as numbers of them that are not read otherwise say."""
-        for column in (*self.layout.unread.counters, *self.layout.unread.others):
+        for column in self.layout.unread.numbering:
             hole = left_out(self._cells(column))
             if hole is not None:
                 raise self._counted(column, *hole)

@@ -74,6 +74,13 @@ class Unread:
     marks: tuple[int, ...] = ()
     hints: tuple[int, ...] = ()
     """Names that tell nothing where samples have times, but how to part the rows if these begin anew."""
+    alone: bool = False
+    """Whether nothing that is read would tell."""
+
+    @property
+    def numbering(self) -> tuple[int, ...]:
+        """Those whose numbers may count samples; names do where nothing else tells impacts or samples apart."""
+        return (*self.counters, *self.others, *self.marks, *(self.names if self.alone else ()))
 
     @property
     def watched(self) -> tuple[int, ...]:
@@ -104,7 +111,7 @@ def unread_columns(headings: Sequence[str], passed: Collection[int], *, timed: b
             continue
         if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks"}:
             found.setdefault(kind, []).append(column)
-    return Unread(**{kind: tuple(columns) for kind, columns in found.items()})
+    return Unread(**{kind: tuple(columns) for kind, columns in found.items()}, alone=alone)
 
 
 def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> str | None:

@@ -82,6 +82,7 @@ def test_rows_that_an_unread_column_tells_apart_are_refused(heading: str, cells:
         ("Impact", each(1)),
         ("Event ID", range(SAMPLES)),
         ("id", [f"{n:03}" for n in range(SAMPLES)]),
+        ("Seq", range(7, 7 + 2 * SAMPLES, 2)),
         ("Impact Force N", np.sin(np.arange(SAMPLES) / 9).round(2).tolist()),
         ("Sample", range(SAMPLES)),
         ("Frame", range(100, 100 + 2 * SAMPLES, 2)),
@@ -182,8 +183,11 @@ def test_numbers_of_samples_that_leave_some_out_are_refused_with_what_helps(head
     assert codes(refused(text, sample_rate_hz=1000.0, fill_gaps=True)) == [(None, "sample-order")]
 
 
-@pytest.mark.parametrize(("heading", "named"), [("", False), ("Unnamed: 0", True), ("tick", True)])
-def test_the_index_of_a_data_frame_that_lost_rows_is_seen_whatever_it_is_called(heading: str, named: bool) -> None:
+@pytest.mark.parametrize(
+    ("heading", "named"),
+    [("", False), *((name, True) for name in ("Unnamed: 0", "tick", "No", "Nr", "Seq", "ID", "record", "Event"))],
+)
+def test_numbers_of_rows_that_were_lost_are_seen_whatever_they_are_called(heading: str, named: bool) -> None:
     problem = refused(counted(heading, [n for n in range(SAMPLES) if n != 15]), sample_rate_hz=1000.0)
     assert codes(problem) == [(None, "sample-order")]
     assert ("sample_number" in problem.detail) is named
