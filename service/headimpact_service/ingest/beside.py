@@ -43,6 +43,6 @@ def with_unread(layout: Layout, table: Table) -> Layout:
         return layout
     clocks = {other.column for other in layout.others.clocks} - {*table.wordless}  # looked at as text, too
     passed = {*layout.numbers, *layout.texts, *table.wordless} - clocks
-    return replace(
-        layout, unread=unread_columns(layout.headings, passed, timed=layout.is_timed, keyed=bool(layout.keys))
-    )
+    timed = layout.is_timed
+    unread = unread_columns(layout.headings, passed, timed=timed, keyed=bool(layout.keys))
+    return replace(layout, unread=unread if timed else replace(unread, peaks=tuple(layout.peaks)))

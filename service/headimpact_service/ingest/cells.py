@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate, chain
 from typing import Any, overload
 
@@ -41,6 +41,11 @@ def is_written_number(cell: str) -> bool:
 def number_said(cell: str) -> float | None:
     """The number in a cell; None where it is none."""
     return float(cell.strip().replace(",", ".")) if is_written_number(cell) else None
+
+
+def numbers_said(cells: Iterable[str]) -> list[float]:
+    """The numbers in cells, without those that are none."""
+    return [float(cell.replace(",", ".")) for cell in map(said, cells) if is_written_number(cell)]
 
 
 def number_text(value: float) -> str:

@@ -7,21 +7,20 @@ from dataclasses import dataclass
 from functools import partial
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.blocks import (
+    are_named_apart,
+    are_several,
+    begins_anew,
+    count_triggers,
+    mark_blocks,
+    peaks_lie_in_blocks,
+    tell_parts,
+)
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.filling import MOST
 from headimpact_service.ingest.layout import Layout
-from headimpact_service.ingest.unread import (
-    are_several,
-    begins_anew,
-    left_out,
-    lie_apart,
-    longest_s,
-    mark_blocks,
-    moment_of,
-    span_s,
-    tell_parts,
-)
+from headimpact_service.ingest.unread import left_out, lie_apart, longest_s, moment_of, span_s
 from headimpact_service.ingest.windows import Rows, numbers_of
 
 _OR_ONE = "; if they are one, say so by an empty group_by"
@@ -72,11 +71,13 @@ class RowLabels:
         """The same of columns that are not read otherwise, by what their headings or their cells say they are."""
         unread = self.layout.unread
         for columns, tell, what in (
-            (unread.names, are_several, _SAY),
+            (unread.names, are_named_apart if unread.alone else are_several, _SAY),
             (unread.times, partial(lie_apart, time_zone=time_zone), _TIME),
             (unread.counters, begins_anew, _COUNT),
             (unread.others, tell_parts, _SAY),
             (unread.marks, mark_blocks, _SAY),
+            (unread.triggers, count_triggers, _SAY),
+            (unread.peaks, peaks_lie_in_blocks, _SAY),
         ):
             for column in columns:
                 if tell(self._cells(column)):
@@ -84,7 +85,7 @@ class RowLabels:
 
     def parting(self) -> str:
         """How a mapping may part the rows: by the first column that is not read and says different things in them."""
-        found = (column for column in self.layout.unread.hints if are_several(self._cells(column)))
+        found = (column for column in self.layout.unread.hints if are_named_apart(self._cells(column)))
         return next((self._by(column) for column in found), "")
 
     def _by(self, column: int) -> str:

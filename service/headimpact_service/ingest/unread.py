@@ -8,14 +8,15 @@ A mapping's empty ``group_by`` says that all rows are one impact.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence, Set
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import groupby, pairwise
+from itertools import pairwise
 
 import numpy as np
 
-from headimpact_service.ingest.cells import is_written_number, said
+from headimpact_service.ingest.blocks import STAY
+from headimpact_service.ingest.cells import is_written_number, numbers_said, said
 from headimpact_service.ingest.date_order import DateOrder, year_first
 from headimpact_service.ingest.impact_json import MIN_RATE_HZ
 from headimpact_service.ingest.times import TimeError, instant
@@ -44,34 +45,35 @@ _MEASURED = frozenset(
     }
 )
 """Words of what is measured, whatever it is of: a sensor's temperature."""
-_MARKS = frozenset(
-    {"is", "flag", "trigger", "triggered", "active", "state", "status", "error", "phase", "stage", "mode"}
-)
+_STATES = frozenset({"is", "flag", "state", "status", "error", "phase", "stage", "mode"})
+_TRIGGERS = frozenset({"trigger", "triggered", "active"})
+_MARKS = _STATES | _TRIGGERS
 """Words of what comes and goes within an impact: an event's flag."""
+_COUNTS = frozenset({"#", "count"})
+"""Words that, like names, make a trigger one that is counted."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
-_WITH_PARTS = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
-_YES_OR_NO = ({"0", "1"}, {"true", "false"}, {"yes", "no"}, {"y", "n"}, {"t", "f"}, {"t", "n"})
 ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
-STAY = 10
-"""What is no time and stays for so many rows on average is none of the samples'."""
 MAX_OTHERS = 16
 """So many columns whose headings say nothing are looked at: a table may have a thousand of what is measured."""
-SHORTEST = 3
-"""Samples of an impact."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unread:
-    """Columns by what their headings say: names of something, times, numbers of samples, anything, and yes or no."""
+    """Columns by what their headings say: names of something, times, numbers of samples, anything, and yes or no.
+
+    `triggers` are those that are counted, `peaks` those of an impact that the device supplies.
+    """
 
     names: tuple[int, ...] = ()
     times: tuple[int, ...] = ()
     counters: tuple[int, ...] = ()
     others: tuple[int, ...] = ()
     marks: tuple[int, ...] = ()
+    triggers: tuple[int, ...] = ()
+    peaks: tuple[int, ...] = ()
     hints: tuple[int, ...] = ()
     """Names that tell nothing where samples have times, but how to part the rows if these begin anew."""
     alone: bool = False
@@ -80,12 +82,14 @@ class Unread:
     @property
     def numbering(self) -> tuple[int, ...]:
         """Those whose numbers may count samples; names do where nothing else tells impacts or samples apart."""
-        return (*self.counters, *self.others, *self.marks, *(self.names if self.alone else ()))
+        names = self.names if self.alone else ()
+        return (*self.counters, *self.others, *self.marks, *self.triggers, *names)
 
     @property
     def watched(self) -> tuple[int, ...]:
         """Those that must say the same, or count on, within an impact."""
-        return (*self.names, *self.times, *self.counters, *self.others, *self.marks)
+        told = (*self.names, *self.times, *self.counters, *self.others)
+        return (*told, *self.marks, *self.triggers, *self.peaks)
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -109,7 +113,7 @@ def unread_columns(headings: Sequence[str], passed: Collection[int], *, timed: b
         words = {word.lower() for word in _WORD.findall(heading)}
         if column in passed or (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
             continue
-        if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks"}:
+        if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks", "triggers"}:
             found.setdefault(kind, []).append(column)
     return Unread(**{kind: tuple(columns) for kind, columns in found.items()}, alone=alone)
 
@@ -123,7 +127,8 @@ def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> st
     if words & _MEASURED:
         return None
     if words & _MARKS:
-        return "marks" if alone else None
+        counted = words & (_NAMES | _PARTS | _COUNTS) and not words & _STATES
+        return None if not alone else "triggers" if counted else "marks"
     if words & telling:
         return "names"
     if words & (_NAMES | _PARTS):
@@ -131,30 +136,9 @@ def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> st
     return "others" if alone else None
 
 
-def begins_anew(cells: Sequence[str]) -> bool:
-    """Whether numbers of samples stand still or go back to one that was before, or are names that stay for many."""
-    told = _numbers(cells)
-    if not told:
-        return lie_in_blocks(cells)
-    return any(after <= before for before, after in pairwise(told)) and len(set(told)) > 1
-
-
-def _numbers(cells: Sequence[str]) -> list[float]:
-    return [float(cell.replace(",", ".")) for cell in map(said, cells) if is_written_number(cell)]
-
-
-def are_several(cells: Sequence[str]) -> bool:
-    """Whether a column names more than one thing: not one that is measured, nor one that numbers its rows."""
-    told = list(filter(None, map(said, cells)))
-    distinct = set(told)
-    if {word.lower() for word in distinct} in _YES_OR_NO and sum(a != b for a, b in pairwise(told)) > 1:
-        return False  # a mark that came and went
-    return 1 < len(distinct) < len(cells) and not any(map(_WITH_PARTS.fullmatch, distinct))
-
-
 def left_out(cells: Sequence[str]) -> tuple[float, float, float] | None:
     """Where numbers that count samples in steps of one size first leave some out: before, behind, and the step."""
-    told = np.array(_numbers(cells))
+    told = np.array(numbers_said(cells))
     steps = np.diff(told)
     if not steps.size or len(told) < len(cells) or (steps <= 0).any():
         return None
@@ -166,46 +150,6 @@ def left_out(cells: Sequence[str]) -> tuple[float, float, float] | None:
     return (float(told[holes[0]]), float(told[holes[0] + 1]), step) if holes.size else None
 
 
-def tell_parts(cells: Sequence[str]) -> bool:
-    """Whether a column parts its rows as impacts are parted, whatever it is called: in blocks, or counting anew."""
-    return lie_in_blocks(cells) or _count_up(_blocks(cells)) or _counts_anew(cells)
-
-
-def _counts_anew(cells: Sequence[str]) -> bool:
-    """Whether a column counts its rows one by one and begins at its first number again, as a data frame's index may."""
-    steps = np.diff(told) if (told := _numbers(cells)) and len(told) == len(cells) else np.empty(0)
-    again = steps != 1.0
-    return bool(again.any() and 3 * again.sum() <= again.size and (np.array(told)[1:][again] == told[0]).all())
-
-
-def lie_in_blocks(cells: Sequence[str]) -> bool:
-    """Whether every value has rows of its own that follow each other, and two have as many, as names of impacts do."""
-    lengths = _blocks(cells)
-    return len(set(lengths.values())) < len(lengths)
-
-
-def mark_blocks(cells: Sequence[str]) -> bool:
-    """The same of a column of marks, of which yes and no are none."""
-    return {word.lower() for word in _blocks(cells)} not in _YES_OR_NO and lie_in_blocks(cells)
-
-
-def _blocks(cells: Sequence[str]) -> dict[str, int]:
-    """How many rows each value has, where they follow each other; none where a value comes back or is measured."""
-    lengths: dict[str, int] = {}
-    for text, run in groupby(map(said, cells)):
-        length = sum(1 for _ in run)
-        if length < SHORTEST or not text or text in lengths or _WITH_PARTS.fullmatch(text):
-            return {}
-        lengths[text] = length
-    return lengths
-
-
-def _count_up(blocks: Mapping[str, int]) -> bool:
-    """Whether three values or more count up one by one, each for many rows, however many these are."""
-    told = _numbers(list(blocks))
-    return len(told) == len(blocks) > 2 and min(blocks.values()) >= STAY and set(np.diff(told)) == {1.0}
-
-
 def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:
     """Whether times are further apart than the samples of one impact are."""
     told = list(dict.fromkeys(filter(None, map(said, cells))))
@@ -213,7 +157,7 @@ def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:
         return False
     most = longest_s(len(cells))
     if all(map(is_written_number, told)):
-        stamps = _numbers(cells)
+        stamps = numbers_said(cells)
         fall = any(after < before for before, after in pairwise(stamps))
         return fall or (len(told) * STAY <= len(cells) and stamps[-1] - stamps[0] > most)
     moments = [when for text in told if (when := moment_of(text, time_zone)) is not None]

@@ -117,6 +117,76 @@ def test_one_impact_stays_one(heading: str, cells: Sequence[object]) -> None:
     assert shape(one(untimed(heading, cells, records=1), sample_rate_hz=1000.0)) == SAMPLES
 
 
+def long(heading: str, names: Sequence[object], lengths: Sequence[int], column: bool = True) -> str:
+    """A table without times of one impact below the other, with what each is called in all its rows or in the first."""
+    names_of_rows = [
+        name if column or row == 0 else "" for name, length in zip(names, lengths, strict=True) for row in range(length)
+    ]
+    first, *_ = untimed(heading, range(SAMPLES), records=1).splitlines()
+    rows = [",".join(map(repr, row)) for length in lengths for row in six_axis(length).tolist()]
+    return "\n".join([first, *(f"{name},{row}" for name, row in zip(names_of_rows, rows, strict=True))])
+
+
+EQUAL, UNEQUAL, ODD = (100, 100, 100), (100, 98, 99), (64, 100, 156)
+
+
+@pytest.mark.parametrize(
+    ("heading", "names", "lengths"),
+    [
+        *((name, names, EQUAL) for name in ("Trial", "Test", "Impact") for names in ((3.1, 3.2, 3.3), (1.1, 1.2, 2.1))),
+        ("Trial", (12.01, 12.02, 12.03), (30, 40, 35)),
+        *(("HIC", (12.5, 33.1, 44.9), lengths) for lengths in (EQUAL, UNEQUAL)),
+        ("HIC", (12.5, 33.1), (100, 100)),
+        *((name, ("turf", "mat", "sand"), UNEQUAL) for name in ("Surface", "Kennung")),
+        *(
+            (name, (1, 2, 3), lengths)
+            for name in ("Trigger #", "trigger_count", "Active Event")
+            for lengths in (UNEQUAL, ODD)
+        ),
+        ("event_status", (1, 2, 3), UNEQUAL),
+        *(("PLA (g)", (44.1, 52.2, 60.3), lengths) for lengths in (EQUAL, UNEQUAL, ODD)),
+        ("PLA (g)", (44.1, 52.2), (40, 50)),
+        ("Peak G", (44, 52, 60), EQUAL),
+    ],
+)
+def test_a_value_an_impact_parts_the_rows(heading: str, names: Sequence[object], lengths: Sequence[int]) -> None:
+    text = long(heading, names, lengths)
+    problem = refused(text, sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "several-impacts")]
+    assert f'group_by (["{heading}"]' in problem.detail
+    assert shape(one(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[]))) == sum(lengths)
+    found = read(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[heading]))
+    assert [shape(record) for record in found] == list(lengths)
+
+
+def test_a_peak_in_the_first_row_of_each_impact_parts_the_rows() -> None:
+    problem = refused(long("PLA (g)", (44.1, 52.2, 60.3), EQUAL, column=False), sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "several-impacts")]
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [
+        ("phase", [0] * 64 + [1] * 100 + [2] * 156),
+        ("trigger", [0] * 64 + [1] * 100 + [2] * 156),
+        ("Event Flag", [0] * 160 + [1] * 160),
+        ("Active Event", [0] * 160 + [1] * 160),
+        ("Trigger #", [0] * 32 + [1] * 288),
+        ("label", ["pre"] * 64 + ["impact"] * 100 + ["post"] * 156),
+        ("speed", [5.5] * 120 + [5.6] * 200),
+        ("speed", [round(5.5 + n // 40 / 10, 1) for n in range(320)]),
+        ("Impact Speed", [round(5.5 + n // 16 / 10, 1) for n in range(320)]),
+        ("PLA (g)", [0.0] * 20 + [n / 2 for n in range(120)] + [60.0] * 180),
+        ("PLA (g)", [44.5, *[""] * 319]),
+    ],
+)
+def test_what_changes_within_one_long_impact_leaves_it_one(heading: str, cells: Sequence[object]) -> None:
+    first, *_ = untimed(heading, range(SAMPLES), records=1).splitlines()
+    rows = [",".join(map(repr, row)) for row in six_axis(320).tolist()]
+    text = "\n".join([first, *(f"{cell},{row}" for cell, row in zip(cells, rows, strict=True))])
+    assert shape(one(text, sample_rate_hz=3200.0)) == 320
+
+
 def test_the_sender_may_say_that_they_are_one_or_what_tells_them_apart() -> None:
     text = untimed("Event", each(1, 2, 3))
     assert shape(one(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[]))) == 3 * SAMPLES
