@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import from_json
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import is_written_number
 from headimpact_service.ingest.date_order import DateOrder, year_first
 from headimpact_service.ingest.decimal_commas import has_decimal_comma
 from headimpact_service.ingest.file_faults import file_fault
@@ -30,9 +31,13 @@ from headimpact_service.ingest.impact_json import (
     Strict,
 )
 from headimpact_service.ingest.json_faults import member_errors, payload_errors
+from headimpact_service.ingest.mapping import read_from_none
 from headimpact_service.ingest.times import TimeError, instant
 
 _PRINTABLE = re.compile(PRINTABLE)
+_RATE = re.compile(r"(?P<number>\S+?)\s*(?:(?P<kilo>k?)(?:hz|sps))?", re.IGNORECASE)
+_BESIDE = frozenset({"axes", "filter", "sample_rate_hz"})
+"""Fields of how to read an impact that may stand beside the file."""
 Texts = tuple[tuple[str, str], ...]
 """Fields and their cells, those that are empty left out."""
 
@@ -59,6 +64,22 @@ def _point(value: Any) -> Any:  # noqa: ANN401 - validated after
     return value.replace(",", ".") if isinstance(value, str) and has_decimal_comma(value) else value
 
 
+def _rate(value: Any) -> Any:  # noqa: ANN401 - validated after
+    """A number of samples per second, with its unit or without, in hertz."""
+    said = _RATE.fullmatch(value.strip()) if isinstance(value, str) else None
+    if said is None:
+        return value
+    number = _point(said["number"])
+    if "," in number or not is_written_number(number):
+        return value
+    return float(number) * (1000.0 if said["kilo"] else 1.0)
+
+
+def says_rate(text: str) -> bool:
+    """Whether a cell says a sample rate."""
+    return isinstance(_rate(text), float)
+
+
 class Reading(Strict):
     """How an impact's samples are to be read, as its row says; each field as in the JSON of an impact."""
 
@@ -68,7 +89,7 @@ class Reading(Strict):
     pre_trigger_ms: Annotated[float | None, BeforeValidator(_point)] = Field(None, ge=0.0, le=60_000.0)
     location: Annotated[Location | None, BeforeValidator(_location)] = None
     mounting: Annotated[MountingBody, BeforeValidator(_json)] | None = None
-    sample_rate_hz: Annotated[float | None, BeforeValidator(_point)] = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
+    sample_rate_hz: Annotated[float | None, BeforeValidator(_rate)] = Field(None, ge=MIN_RATE_HZ, le=MAX_RATE_HZ)
     fill_gaps: bool = False
 
 
@@ -81,7 +102,7 @@ def reading_of(texts: Texts) -> Reading:
     try:
         return Reading.model_validate(dict(texts), strict=False)
     except ValidationError as error:
-        raise _cell_problem(error) from None
+        raise _cell_problem(error, "reading") from None
 
 
 @lru_cache(maxsize=1024)
@@ -90,13 +111,21 @@ def context_of(texts: Texts) -> dict[str, Any]:
     try:
         return Context.model_validate(dict(texts), strict=False).model_dump(exclude_none=True)
     except ValidationError as error:
-        raise _cell_problem(error) from None
+        raise _cell_problem(error, "context") from None
 
 
-def _cell_problem(error: ValidationError) -> Problem:
+def _cell_problem(error: ValidationError, table: str) -> Problem:
+    """What is wrong with a cell of a mapping's table of fields, and how to leave its column alone."""
     faults = error.errors(include_url=False, include_input=False)
     fault, field = payload_errors(faults[:1], None)[0], str(faults[0]["loc"][0])
-    return file_fault(f"The column of {field}: {fault.detail}", fault.code, parameter=field)
+    stands = field == "sample_rate_hz" and fault.code == "out-of-range"  # a rate that one beside it would contradict
+    beside = f"give {field} beside the file, or " if field in _BESIDE and not stands else ""
+    return file_fault(
+        f"The column of {field}: {fault.detail} If it says something else, {beside}read no {field} from it "
+        f"({json.dumps(read_from_none(table, field))} in a mapping).",
+        fault.code,
+        parameter=field,
+    )
 
 
 def checked_name(text: str | None, field: str) -> str | None:

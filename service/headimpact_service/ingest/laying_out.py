@@ -69,7 +69,7 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: fr
     if name not in required and all(component is None for component in components.values()):
         return None
     given = [axis for axis, component in components.items() if component is not None]
-    turned = mapping.location == "sensor" or "mounting" in (mapping.reading or {})
+    turned = mapping.location == "sensor" or bool((mapping.reading or {}).get("mounting"))
     for axis in missing_axes(name, given, mapping.constrained_plane, turned=turned):
         raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)
@@ -182,15 +182,15 @@ def _context(mapping: Mapping, headings: Headings, required: frozenset[str]) -> 
 
 
 def _named(
-    name: str, columns: dict[Any, list[str]] | None, headings: Headings, required: frozenset[str]
+    name: str, columns: dict[Any, list[str] | None] | None, headings: Headings, required: frozenset[str]
 ) -> dict[str, int]:
     """The columns of a table of fields, as far as they are there."""
     found: dict[str, int] = {}
     for field, spellings in (columns or {}).items():
-        column = headings.find(spellings)
+        column = None if spellings is None else headings.find(spellings)
         if column is not None:
             found[field] = column
-        elif name in required:
+        elif f"{name}.{field}" in required:
             raise _missing(f"The column of {field} was not found.", f"/{name}/{field}")
     return found
 

@@ -95,11 +95,21 @@ class Layout:
         one_each = (self.external_id, self.athlete, self.device, self.unscorable)
         return sorted({c for c in (*one_each, *self.keys, *self.context.values(), *reading) if c is not None})
 
-    def field_of(self, column: int) -> str | None:
-        """What a column is read as that a mapping may do without; None for those that tell impacts apart."""
-        named = {"external_id": self.external_id, "athlete": self.athlete, "device": self.device}
-        named["session_id"] = self.context.get("session_id")
-        return next((field for field, place in named.items() if place == column and column not in self.keys), None)
+    def field_of(self, column: int) -> tuple[str, ...] | None:
+        """What a column is read as that a mapping may do without, as the way to it in the mapping.
+
+        None for a column that tells impacts apart.
+        """
+        named: dict[tuple[str, ...], int | None] = {
+            ("external_id",): self.external_id,
+            ("athlete",): self.athlete,
+            ("device",): self.device,
+            ("session_id",): self.context.get("session_id"),
+            ("unscorable",): self.unscorable,
+            **{("context", field): place for field, place in self.context.items()},
+            **{("reading", field): place for field, place in self.reading.items()},
+        }
+        return next((way for way, place in named.items() if place == column and column not in self.keys), None)
 
     @property
     def numbers(self) -> list[int]:

@@ -131,8 +131,9 @@ class Mapping(Strict):
     `sample_number` counts the samples of an impact one by one: a number that is left out or out of order is refused.
 
     `context` and `reading` are columns of what an impact says of itself: its context, and how its samples are to be
-    read, each as in the JSON of an impact; the impact's first row counts. `time_base` parts the rows of an impact whose
-    signals do not share their times: rows with one value in it go together, and a signal is in one part only.
+    read, each as in the JSON of an impact; the impact's first row counts. A field that is null is read from no column.
+    `time_base` parts the rows of an impact whose signals do not share their times: rows with one value in it go
+    together, and a signal is in one part only.
     """
 
     linear_acceleration: LinearAccelerationColumns | None = None
@@ -147,8 +148,8 @@ class Mapping(Strict):
     athlete: Spellings | None = None
     device: Spellings | None = None
     session_id: Spellings | None = None
-    context: dict[ContextField, Spellings] | None = None
-    reading: dict[ReadingField, Spellings] | None = None
+    context: dict[ContextField, Spellings | None] | None = None
+    reading: dict[ReadingField, Spellings | None] | None = None
     unscorable: Spellings | None = None
     time_base: Spellings | None = None
     sample_number: Spellings | None = None
@@ -168,8 +169,17 @@ class Mapping(Strict):
         return columns
 
 
+def read_from_none(*way: str) -> dict[str, Any]:
+    """The mapping, as JSON, that reads no column for the field that a way of names leads to."""
+    *tables, field = way
+    made: dict[str, Any] = {field: None}
+    for name in reversed(tables):
+        made = {name: made}
+    return made
+
+
 def merge(base: Mapping, over: Mapping | None) -> Mapping:
-    """`base` with everything that `over` gives put in its place; within a signal, field by field."""
+    """`base` with everything that `over` gives put in its place; within a signal and a table of fields, one by one."""
     if over is None:
         return base
     given: dict[str, Any] = {name: getattr(over, name) for name in over.model_fields_set}
@@ -178,4 +188,10 @@ def merge(base: Mapping, over: Mapping | None) -> Mapping:
         if below is not None and above is not None:
             fields = {name: getattr(above, name) for name in above.model_fields_set}
             given[signal] = below.model_copy(update=fields)
+    for name in ("context", "reading"):
+        if given.get(name) is not None:
+            rest = (getattr(base, name) or {}).items()
+            given[name] = given[name] | {field: spelled for field, spelled in rest if field not in given[name]}
+    if "session_id" in (over.context or {}):  # which has a field of its own beside
+        given.setdefault("session_id", None)
     return base.model_copy(update=given)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -20,6 +21,7 @@ from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.filling import MOST
 from headimpact_service.ingest.layout import Layout
+from headimpact_service.ingest.mapping import read_from_none
 from headimpact_service.ingest.unread import left_out, lie_apart, longest_s, moment_of, span_s
 from headimpact_service.ingest.windows import Rows, numbers_of
 
@@ -94,11 +96,11 @@ class RowLabels:
 
     def _or_unread(self, column: int) -> str:
         """How to leave a column alone that says nothing of the impact: a number of each row, say."""
-        field = self.layout.field_of(column)
-        if field is None:
+        way = self.layout.field_of(column)
+        if way is None:
             return ""
-        alone = "" if self.layout.keys else ', "group_by": []'
-        return f'; if they are one, read no {field} from it ({{"{field}": null{alone}}} in a mapping)'
+        alone: dict[str, list[str]] = {} if self.layout.keys else {"group_by": []}
+        return f"; if they are one, read no {way[-1]} from it ({json.dumps(read_from_none(*way) | alone)} in a mapping)"
 
     def _require_counted(self) -> None:
         """Refuse samples that are left out, as numbers of them that are not read otherwise say."""

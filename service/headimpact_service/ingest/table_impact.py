@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import cached_property
@@ -28,6 +28,7 @@ from headimpact_service.ingest.labels import (
     context_of,
     moment,
     reading_of,
+    says_rate,
 )
 from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.record import ImpactRecord
@@ -89,17 +90,22 @@ class TableImpact:
     @cached_property
     def reading(self) -> Reading:
         """What the impact's rows say of how to read it."""
-        return self._reading((field, self.labels.said(column)) for field, column in self.layout.reading.items())
+        return self._reading([(field, self.labels.said(column)) for field, column in self.layout.reading.items()])
 
     def _reading_at(self, cell: int) -> Reading:
         """The same of one part of an impact."""
         columns = self.layout.reading.items()
-        return self._reading((field, said(self.samples.texts[column][cell])) for field, column in columns)
+        return self._reading([(field, said(self.samples.texts[column][cell])) for field, column in columns])
 
-    def _reading(self, cells: Iterable[tuple[str, str]]) -> Reading:
-        if not self.layout.reading:
-            return NOTHING_SAID
-        return reading_of(tuple((field, text) for field, text in cells if text))
+    def _reading(self, cells: Sequence[tuple[str, str]]) -> Reading:
+        """What cells say; a rate beside the file stands in the place of one that is none."""
+        given = self.options.sample_rate_hz is not None
+        told = tuple(
+            (field, text)
+            for field, text in cells
+            if text and not (given and field == "sample_rate_hz" and not says_rate(text))
+        )
+        return reading_of(told) if told else NOTHING_SAID
 
     def _recording(self, *, scorable: bool) -> Recording:
         mapping, options, reading = self.mapping, self.options, self.reading

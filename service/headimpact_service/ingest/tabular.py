@@ -90,9 +90,18 @@ def _plan(headings: Headings, options: ImportOptions, format_name: str) -> Plan:
     asked = options.mapping
     required = frozenset() if asked is None else frozenset(_names_columns(asked))
     if preset is None:
-        return Plan(merge(beside_signals(headings), asked), None, required, options, format_name)
+        mapping = _without_overridden(merge(beside_signals(headings), asked), options)
+        return Plan(mapping, None, required, options, format_name)
     named = named_facts(options.filename, preset.file_name, options.time_zone)
-    return Plan(merge(preset.mapping_for(headings), asked), preset.name, required, options, format_name, named)
+    mapping = _without_overridden(merge(preset.mapping_for(headings), asked), options)
+    return Plan(mapping, preset.name, required, options, format_name, named)
+
+
+def _without_overridden(mapping: Mapping, options: ImportOptions) -> Mapping:
+    """The mapping without columns in whose place the sender's fields count, whatever they say."""
+    given = {"axes": options.axes, "filter": options.low_pass, "fill_gaps": options.fill_gaps or None}
+    reading = {field: spelled for field, spelled in (mapping.reading or {}).items() if given.get(field) is None}
+    return mapping.model_copy(update={"reading": reading})
 
 
 def _preset(headings: Headings, options: ImportOptions) -> Preset | None:
@@ -174,6 +183,8 @@ def _names_columns(mapping: Mapping) -> Iterator[str]:
             continue
         yield name
         yield from (f"{name}.{kind}" for kind in ("resultant", "peak") if getattr(value, kind, None) is not None)
+        if name in {"context", "reading"}:
+            yield from (f"{name}.{field}" for field, spellings in value.items() if spellings is not None)
 
 
 def _require_rate(layout: Layout, plan: Plan) -> None:

@@ -104,6 +104,46 @@ class TestReading:
         assert [error.code for error in problem.errors] in ([code], ["not-finite"])
         assert cell == "{" or cell not in problem.detail
 
+    @pytest.mark.parametrize(
+        ("heading", "cell", "field"),
+        [
+            ("Filter", "CFC180", "filter"),
+            ("Axes", "SAE", "axes"),
+            ("Mounting", "Left ear", "mounting"),
+            ("fs", "high", "sample_rate_hz"),
+            ("fs", "200", "sample_rate_hz"),
+            ("fill_gaps", "perhaps", "fill_gaps"),
+        ],
+    )
+    def test_a_column_that_says_something_else_is_left_alone_where_a_mapping_says_so(self, heading, cell, field):
+        text = labelled(**{heading: cell})
+        assert f'({{"reading": {{"{field}": null}}}} in a mapping)' in refused(text).detail
+        recording = one(text, mapping=Mapping.model_validate({"reading": {field: None}})).recording
+        assert (recording.axes, recording.low_pass.name, recording.mounting) == ("anatomical", "paper", None)
+
+    def test_a_field_beside_the_file_stands_in_the_place_of_a_column_that_says_something_else(self):
+        text = labelled(filter="CFC180", axes="SAE", sample_rate_hz="high", fill_gaps="perhaps")
+        assert "give filter beside the file" in refused(labelled(filter="CFC180")).detail
+        assert "beside the file" not in refused(labelled(sample_rate_hz=200)).detail
+        given = {"axes": "sae_j211", "low_pass": NO_FILTER, "sample_rate_hz": 1000.0, "fill_gaps": True}
+        recording = one(text, **given).recording
+        assert (recording.axes, recording.low_pass, recording.fill_gaps) == ("sae_j211", NO_FILTER, True)
+        assert codes(refused(labelled(sample_rate_hz=200), **given)) == [("sample_rate_hz", "out-of-range")]
+        half = csv_text().splitlines()
+        two = [f"{['filter', *['CFC180'] * 20, *['CFC600'] * 20][row]},{line}" for row, line in enumerate(half)]
+        assert one("\n".join(two), low_pass=NO_FILTER).recording.low_pass == NO_FILTER
+
+    @pytest.mark.parametrize("cell", ["1000 Hz", "1 kHz", "1kHz", "1,0 kHz", "1000.0 hz", "1000 sps"])
+    def test_a_rate_may_name_its_unit(self, cell):
+        recording = one(labelled(fs=cell).replace("t_s", "x")).recording
+        assert recording.linear_acceleration.sample_rate_hz == 1000.0
+        contradicted = refused(labelled(fs="2 kHz"), sample_rate_hz=1000.0)
+        assert codes(contradicted) == [("sample_rate_hz", "rate-differs")]
+
+    @pytest.mark.parametrize("cell", ["1,000 Hz", "1 MHz", "1k", "Hz", "1 000 Hz"])
+    def test_a_rate_whose_number_or_unit_is_not_clear_is_refused(self, cell):
+        assert codes(refused(labelled(fs=cell))) == [("sample_rate_hz", "wrong-type")]
+
     def test_an_improper_rotation_is_refused(self):
         mirrored = {"accelerometer": MOUNTING["accelerometer"] | {"rotation": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]}}
         assert refused(labelled(mounting=json.dumps(mirrored))).slug == "improper-rotation"
@@ -141,6 +181,39 @@ class TestContext:
         problem = refused(labelled(**{field: cell}))
         assert [error.parameter for error in problem.errors] == [field]
         assert cell not in problem.detail
+
+    @pytest.mark.parametrize(
+        ("field", "cells"),
+        [
+            ("worn", [1] * 20 + [0] * 20),
+            ("activity", ["run"] * 20 + ["hit"] * 20),
+            ("level", [97] * 15 + [96] * 25),
+            ("position", [n / 8 for n in range(40)]),
+        ],
+    )
+    def test_a_column_that_says_something_of_each_sample_is_left_alone_where_a_mapping_says_so(self, field, cells):
+        first, *lines = csv_text().splitlines()
+        text = "\n".join([f"{field},{first}", *(f"{cell},{line}" for cell, line in zip(cells, lines, strict=True))])
+        problem = refused(text)
+        assert codes(problem) == [(None, "several-impacts")]
+        assert f'({{"context": {{"{field}": null}}, "group_by": []}} in a mapping)' in problem.detail
+        unread = {"context": {field: None}}
+        for mapping in (unread, unread | {"group_by": []}):
+            assert one(text, mapping=Mapping.model_validate(mapping)).context == {}
+        untimed = text.replace("t_s", "x")
+        assert one(untimed, sample_rate_hz=1e3, mapping=Mapping.model_validate(unread | {"group_by": []})).context == {}
+        named = text.replace("\n", "\ni1,").replace(field, f"impact_id,{field}", 1)
+        assert f'({{"context": {{"{field}": null}}}} in a mapping)' in refused(named).detail
+        assert one(named, mapping=Mapping.model_validate(unread)).context == {}
+
+    def test_a_mapping_corrects_single_fields(self):
+        text = labelled(worn="false", activity="game", session_id="s-1", sex="M")
+        assert '({"context": {"sex": null}} in a mapping)' in refused(text).detail
+        record = one(text, mapping=Mapping.model_validate({"context": {"sex": None}}))
+        assert record.context == {"worn": False, "activity": "game", "session_id": "s-1"}
+        without = one(text, mapping=Mapping.model_validate({"context": {"sex": None, "session_id": None}}))
+        assert without.context == {"worn": False, "activity": "game"}
+        assert one(text, mapping=Mapping.model_validate({"context": None})).context == {"session_id": "s-1"}
 
 
 class TestNames:

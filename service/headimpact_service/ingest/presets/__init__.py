@@ -78,7 +78,8 @@ def _with_names(mapping: Mapping, headings: Headings) -> Mapping:
         added["group_by"] = generic.group_by
     if not _has_times(mapping, headings) and (times := _vocabulary(_generic().name).time(headings)):
         added["time"] = times
-    reading = {name: spelled for name, spelled in (generic.reading or {}).items() if headings.find(spelled) is not None}
+    spellings = (generic.reading or {}).items()
+    reading = {name: spelled for name, spelled in spellings if spelled and headings.find(spelled) is not None}
     if reading:
         added["reading"] = reading | (mapping.reading or {})
     return mapping.model_copy(update=added)
