@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.other_times import other_times, stated_above
-from headimpact_service.ingest.presets import times_of
+from headimpact_service.ingest.presets import keys_of, times_of
 from headimpact_service.ingest.supplied import spoken_in
 from headimpact_service.ingest.table import Table
-from headimpact_service.ingest.unread import unread_columns
+from headimpact_service.ingest.unread import Unread, unread_columns
 
 
 def with_other_times(layout: Layout, headings: Headings, table: Table) -> Layout:
@@ -37,12 +38,19 @@ def with_supplied(layout: Layout, headings: Headings, table: Table) -> Layout:
     return replace(layout, signals=signals)
 
 
-def with_unread(layout: Layout, table: Table) -> Layout:
-    """The layout, with the columns beside it that may tell several impacts from one."""
+def with_unread(layout: Layout, headings: Headings, table: Table, group_by: Sequence[object] | None) -> Layout:
+    """The layout, with the columns beside it that may tell several impacts from one.
+
+    What the sender names in `group_by` tells them apart; if that is empty the rows are one impact, unless the column
+    that is for it says that they are not.
+    """
+    if group_by == []:
+        named = tuple(column for column in keys_of(headings) if column not in {*layout.numbers, *layout.texts})
+        return replace(layout, unread=Unread(names=named, said_one=True))
     if layout.sample_number is not None:
         return layout
     clocks = {other.column for other in layout.others.clocks} - {*table.wordless}  # looked at as text, too
     passed = {*layout.numbers, *layout.texts, *table.wordless} - clocks
     timed = layout.is_timed
-    unread = unread_columns(layout.headings, passed, timed=timed, keyed=bool(layout.keys))
+    unread = unread_columns(layout.headings, passed, timed=timed, keyed=bool(layout.keys), named=bool(group_by))
     return replace(layout, unread=unread if timed else replace(unread, peaks=tuple(layout.peaks)))

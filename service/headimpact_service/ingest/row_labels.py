@@ -83,7 +83,16 @@ class RowLabels:
         ):
             for column in columns:
                 if tell(self._cells(column)):
-                    raise self._several(column, what, _OR_ONE)
+                    raise self._several(column, what, self._or_one())
+
+    def _or_one(self) -> str:
+        """What to do if a column that is not read says nothing of impacts."""
+        if self.layout.unread.said_one:
+            return ""
+        if not self.layout.keys:
+            return _OR_ONE
+        keys = ", ".join(f'"{self.layout.headings[column]}"' for column in self.layout.keys)
+        return f'; if it is of the samples, say in a mapping what tells impacts apart ({{"group_by": [{keys}]}})'
 
     def parting(self) -> str:
         """How a mapping may part the rows: by the first column that is not read and says different things in them."""

@@ -54,8 +54,8 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
         layout = with_other_times(layout, headings, table)
     if plan.preset is not None:
         layout = with_supplied(layout, headings, table)
-    if not (table.parted or _names_one_impact(options)):
-        layout = with_unread(layout, table)
+    if not table.parted:
+        layout = with_unread(layout, headings, table, None if options.mapping is None else options.mapping.group_by)
     blocks = table.blocks(layout.numbers, layout.texts)
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
     count = 0

@@ -12,6 +12,7 @@ from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +43,7 @@ _MEASURED = frozenset(
     {
         *("temp", "temperature", "battery", "voltage", "volt", "charge", "current", "pressure", "humidity", "force"),
         *("saturated", "saturation", "proximity", "distance", "light", "quality", "valid", "threshold"),
+        *("load", "speed", "velocity", "heart", "hr", "rssi", "gain", "raw", "signal"),
     }
 )
 """Words of what is measured, whatever it is of: a sensor's temperature."""
@@ -78,6 +80,8 @@ class Unread:
     """Names that tell nothing where samples have times, but how to part the rows if these begin anew."""
     alone: bool = False
     """Whether nothing that is read would tell."""
+    said_one: bool = False
+    """Whether the sender says that the rows are one impact."""
 
     @property
     def numbering(self) -> tuple[int, ...]:
@@ -100,14 +104,17 @@ class Unread:
 NOTHING_UNREAD = Unread()
 
 
-def unread_columns(headings: Sequence[str], passed: Collection[int], *, timed: bool, keyed: bool) -> Unread:
+def unread_columns(
+    headings: Sequence[str], passed: Collection[int], *, timed: bool, keyed: bool, named: bool = False
+) -> Unread:
     """The columns, but for some that are `passed` over, whose headings speak of impacts, of times or of samples.
 
     Of a table whose samples have times only names; where nothing tells impacts apart, only those of people: an event
-    may be marked within one impact. Where neither times nor names tell, columns whose headings say nothing, too.
+    may be marked within one impact. Nor do others count where the sender has `named` what tells impacts apart. Where
+    neither times nor names tell, columns whose headings say nothing, too.
     """
     alone = not (timed or keyed)
-    telling = _NAMES | _PARTS if alone else _NAMES if keyed else _PERSONS
+    telling = _NAMES | _PARTS if alone else _NAMES if keyed and not named else _PERSONS
     found: dict[str, list[int]] = {}
     for column, heading in enumerate(headings):
         words = {word.lower() for word in _WORD.findall(heading)}
@@ -115,7 +122,8 @@ def unread_columns(headings: Sequence[str], passed: Collection[int], *, timed: b
             continue
         if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks", "triggers"}:
             found.setdefault(kind, []).append(column)
-    return Unread(**{kind: tuple(columns) for kind, columns in found.items()}, alone=alone)
+    columns: dict[str, Any] = {kind: tuple(of_kind) for kind, of_kind in found.items()}
+    return Unread(**columns, alone=alone)
 
 
 def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> str | None:

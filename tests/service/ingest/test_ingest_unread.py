@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
+from binary_files import COLUMNS
 from ingest_files import codes, csv_text, one, read, refused, six_axis
+from making import table
 
 from headimpact.preparation import prepare
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 
@@ -349,3 +353,44 @@ def test_times_that_begin_anew_beside_nothing_that_parts_them_say_so_too() -> No
     assert problem.detail.endswith("by a column impact_id or a mapping's group_by.")
     lists = "\n".join([first, *lines[:20], lines[18], *lines[20:]])  # one time that goes back is no other impact
     assert shape(one(lists)) == SAMPLES + 1
+
+
+def keyed(heading: str, cell: Callable[[int], Any], timed: bool) -> bytes:
+    """Three impacts with their ids, and a column that changes within each."""
+    rows = [
+        [name, *([n] if timed else []), *row, cell(n)]
+        for name in ("i0", "i1", "i2")
+        for n, row in enumerate(six_axis().tolist())
+    ]
+    return table(["impact_id", *(["t_ms"] if timed else []), *COLUMNS, heading], rows)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+@pytest.mark.parametrize(
+    "heading", ["Impact Phase", "Device RSSI", "Player HR", "Test Load (N)", "Run Speed", "sensor_raw_x"]
+)
+def test_what_changes_within_impacts_that_have_ids_is_of_the_samples(heading: str, timed: bool):
+    beside = {} if timed else {"sample_rate_hz": 1000.0}
+    found = read(keyed(heading, lambda n: n // 20, timed), **beside)
+    assert [record.recording.linear_acceleration.values.shape for record in found] == [(40, 3)] * 3
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_the_way_that_is_named_for_a_column_of_the_samples_beside_ids_works(timed: bool):
+    beside = {} if timed else {"sample_rate_hz": 1000.0}
+    text = keyed("hit zone", lambda n: "ab"[n // 20], timed)
+    problem = read(text, **beside)[0]
+    assert isinstance(problem, Problem)
+    assert codes(problem) == [(None, "several-impacts")]
+    assert '{"group_by": ["impact_id"]}' in problem.detail
+    assert "empty group_by" not in problem.detail
+    found = read(text, mapping=Mapping.model_validate({"group_by": ["impact_id"]}), **beside)
+    assert [record.recording.linear_acceleration.values.shape for record in found] == [(40, 3)] * 3
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_rows_with_several_ids_are_not_one_impact_whatever_is_said(timed: bool):
+    beside = {} if timed else {"sample_rate_hz": 1000.0}
+    problem = refused(keyed("x1", lambda n: 1, timed), mapping=Mapping.model_validate({"group_by": []}), **beside)
+    assert codes(problem) == [(None, "several-impacts")]
+    assert "Column 1 (impact_id)" in problem.detail

@@ -127,6 +127,11 @@ def spoken_of(headings: Headings) -> dict[SignalName, list[str]]:
     return _vocabulary(_generic().name).components(headings)
 
 
+def keys_of(headings: Headings) -> list[int]:
+    """The columns that tell impacts apart wherever no layout says which do."""
+    return [column for spelled in _generic().mapping.group_by or () if (column := headings.find(spelled)) is not None]
+
+
 def times_of(headings: Headings) -> set[int]:
     """The columns whose headings are words for the samples' times, whatever layout they are read by."""
     vocabulary = _vocabulary(_generic().name)
