@@ -51,7 +51,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     _require_rate(layout, plan)
     _require_no_other_rate(layout, plan, headings)
     if options.mapping is None or "time" not in options.mapping.model_fields_set:
-        layout = with_other_times(layout, headings, table)
+        layout = with_other_times(layout, headings, table, rates=_reads_rates(options))
     if plan.preset is not None:
         layout = with_supplied(layout, headings, table)
     if not table.parted:
@@ -68,6 +68,12 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
         del window  # before the next is put together beside it
     if count == 0:
         raise Problem("unreadable-file", "The file has headings but no samples.")
+
+
+def _reads_rates(options: ImportOptions) -> bool:
+    """Whether columns of a rate count: the sender may say that none does."""
+    reading = {} if options.mapping is None else options.mapping.reading or {}
+    return reading.get("sample_rate_hz", ()) is not None
 
 
 def _names_one_impact(options: ImportOptions) -> bool:
