@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from headimpact.recording import SignalName
+from headimpact_service.ingest.axis_peaks import unclear_axis
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.other_times import other_times, stated_above
@@ -40,6 +42,16 @@ def with_supplied(layout: Layout, headings: Headings, table: Table) -> Layout:
     return replace(layout, signals=signals)
 
 
+def with_axis_peaks(layout: Layout, found: Mapping[int, SignalName], table: Table) -> Layout:
+    """The layout, with columns beside it that are each axis' peak, unless they hold a value a sample."""
+    passed = {*layout.numbers, *layout.texts}
+    beside = {column: signal for column, signal in found.items() if column not in passed}
+    for column, signal in beside.items():
+        if column in table.wordless:
+            raise unclear_axis(layout.named(column), signal)
+    return replace(layout, axis_peaks=beside)
+
+
 def with_unread(layout: Layout, headings: Headings, table: Table, group_by: Sequence[object] | None) -> Layout:
     """The layout, with the columns beside it that may tell several impacts from one.
 
@@ -55,4 +67,4 @@ def with_unread(layout: Layout, headings: Headings, table: Table, group_by: Sequ
     passed = {*layout.numbers, *layout.texts, *table.wordless} - clocks
     timed = layout.is_timed
     unread = unread_columns(layout.headings, passed, timed=timed, keyed=bool(layout.keys), named=bool(group_by))
-    return replace(layout, unread=unread if timed else replace(unread, peaks=tuple(layout.peaks)))
+    return replace(layout, unread=unread if timed else replace(unread, peaks=(*layout.peaks, *layout.axis_peaks)))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from headimpact.recording import AXES, SignalName
 from headimpact_service.ingest.date_order import DateOrder
@@ -75,6 +76,8 @@ class Layout:
     unscorable: int | None
     time_base: int | None
     sample_number: int | None
+    axis_peaks: Mapping[int, SignalName] = field(default_factory=dict)
+    """Columns that are passed over as each axis' peak, a value an impact; samples they may not be."""
     others: OtherTimes = NO_OTHERS
     """What may say other times than those that are read."""
     unread: Unread = NOTHING_UNREAD
@@ -131,7 +134,8 @@ class Layout:
     def texts(self) -> list[int]:
         """Columns that are read as text."""
         one_each = (self.external_id, self.athlete, self.device, self.unscorable, self.time_base)
-        named = (*one_each, *self.keys, *self.occurred_at, *self.context.values(), *self.reading.values(), *self.peaks)
+        tables = (*self.context.values(), *self.reading.values())
+        named = (*one_each, *self.keys, *self.occurred_at, *tables, *self.peaks, *self.axis_peaks)
         others = [rate.column for rate in self.others.rates]
         return sorted({column for column in (*named, *others, *self.unread.columns) if column is not None})
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.axis_peaks import unclear_axis
 from headimpact_service.ingest.blocks import (
     are_named_apart,
     are_several,
@@ -67,6 +68,9 @@ class RowLabels:
                 raise self._several(column, _SAY, self._or_unread(column))
         if any(len(self._distinct(column)) > 1 for column in self.layout.occurred_at):
             self._require_one_time(self.layout.occurred_at, time_zone)
+        for column, signal in self.layout.axis_peaks.items():
+            if len([cell for cell in self._distinct(column) if cell]) > 1:
+                raise unclear_axis(self.layout.named(column), signal)
         self._require_counted()
 
     def _require_unread_alike(self, time_zone: str | None) -> None:

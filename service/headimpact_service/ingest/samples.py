@@ -27,7 +27,9 @@ class Samples:
 
     def _changed(self, layout: Layout) -> NDArray[np.intp] | None:
         """How often what rows say of their impact has changed, row by row; None where nothing is said in rows."""
-        columns = sorted({*layout.labels, *layout.occurred_at, *layout.unread.watched, *layout.peaks})
+        columns = sorted(
+            {*layout.labels, *layout.occurred_at, *layout.unread.watched, *layout.peaks, *layout.axis_peaks}
+        )
         if not columns or self.window.columns.lengths is not None:
             return None
         return np.cumsum(changed_rows(self.texts, columns, self.window.columns.rows))

@@ -90,11 +90,12 @@ def _words(signal: SignalName) -> _Words:
     said, of_signal = vocabulary()["supplied"], vocabulary()[signal]
     quantities = [compact(word) for word in of_signal["words"]]
     resultants = {form for name, word in product(quantities, said["resultant"]) for form in _joined(name, word)}
-    named = {form for name, word in product((*quantities, *resultants), said["peak"]) for form in _joined(name, word)}
-    unnamed = {form for name, word in product(said["alone"], said["peak"]) for form in _joined(name, word)}
+    clear = (*resultants, *said["alone"], *of_signal["peaks"])
+    named = {form for name, word in product((*quantities, *clear), said["peak"]) for form in _joined(name, word)}
+    largest = {form for name, word in product(clear, said["largest"]) for form in _joined(name, word)}
     spelled = [(compact(s), unit) for unit, spellings in of_signal["units"].items() for s in spellings]
     longest_first = sorted(spelled, key=lambda one: len(one[0]), reverse=True)
-    peaks = {*named, *unnamed, *said["peak"], *of_signal["peaks"]}
+    peaks = {*named, *largest, *said["peak"], *of_signal["peaks"]}
     return _Words(frozenset(resultants), frozenset(peaks), (*longest_first, ("", None)))
 
 

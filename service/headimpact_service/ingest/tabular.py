@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from headimpact.quality import words
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.beside import with_other_times, with_supplied, with_unread
+from headimpact_service.ingest.beside import with_axis_peaks, with_other_times, with_supplied, with_unread
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.file_names import named_facts
 from headimpact_service.ingest.headings import Headings, layout_problem
@@ -54,6 +54,8 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
         layout = with_other_times(layout, headings, table, rates=_reads_rates(options))
     if plan.preset is not None:
         layout = with_supplied(layout, headings, table)
+        if options.mapping is None or not _names_signals(options.mapping):
+            layout = with_axis_peaks(layout, preset_named(plan.preset).axis_peaks(headings), table)
     if not table.parted:
         layout = with_unread(layout, headings, table, None if options.mapping is None else options.mapping.group_by)
     blocks = table.blocks(layout.numbers, layout.texts)

@@ -49,8 +49,9 @@ def test_a_resultant_beside_the_axes_is_compared_in_its_own_unit(heading: str, f
 @pytest.mark.parametrize(
     ("heading", "of", "factor"),
     [
-        *((name, LINEAR, 1.0) for name in ("PLA (g)", "Peak Linear Acceleration (g)", "peak_g", "Max Lin Accel (g)")),
-        *((name, LINEAR, 1.0) for name in ("Peak Resultant Linear Acceleration (g)", "resultant_peak_g", "acc_max_g")),
+        *((name, LINEAR, 1.0) for name in ("PLA (g)", "Peak Linear Acceleration (g)", "peak_g", "Peak Lin Accel (g)")),
+        *((name, LINEAR, 1.0) for name in ("Peak Resultant Linear Acceleration (g)", "resultant_peak_g", "acc_pk_g")),
+        *((name, LINEAR, 1.0) for name in ("Max Resultant (g)", "resultant_max_g", "ar_max_g", "PLA Max (g)")),
         ("PLA (m/s^2)", LINEAR, GRAVITY),
         *((name, ANGULAR, 1.0) for name in ("PAV (rad/s)", "Peak Angular Velocity (rad/s)", "PRV [rad/s]")),
         ("peak omega (deg/s)", ANGULAR, 180.0 / np.pi),
@@ -84,6 +85,63 @@ def test_what_names_no_unit_or_no_signal_that_is_read_is_compared_with_nothing(h
     record = one(beside(heading, np.full(40, 77.0)))
     assert mismatches(record) == []
     np.testing.assert_array_equal(record.recording.linear_acceleration.values, six_axis()[:, :3])
+
+
+@pytest.mark.parametrize(
+    ("heading", "full_scale"),
+    [
+        *((name, 200.0) for name in ("Accel Max (g)", "acc_max_g", "a_max_g", "Max Acceleration (g)", "max_g")),
+        *((name, 200.0) for name in ("Accelerometer Max (g)", "Maximum (g)", "Max Lin Accel (g)")),
+        *((name, 2000.0) for name in ("Gyro Max (deg/s)", "gyro_max_dps", "Max Angular Velocity (deg/s)")),
+    ],
+)
+def test_the_most_that_a_sensor_measures_is_no_peak(heading: str, full_scale: float) -> None:
+    assert mismatches(one(beside(heading, np.full(40, full_scale)))) == []
+
+
+def of_each_axis(heading: str, columns: np.ndarray) -> str:
+    headings = ",".join(heading.format(axis) for axis in "xyz")
+    return csv_text(np.column_stack([six_axis(), columns]), heading=f"{GENERIC},{headings}")
+
+
+@pytest.mark.parametrize(
+    ("heading", "of"),
+    [
+        *((name, slice(0, 3)) for name in ("PLA {} (g)", "PLA_{}_g", "{} PLA (g)", "Peak Linear Acceleration {} (g)")),
+        *((name, slice(3, 6)) for name in ("PAV {} (rad/s)", "Peak Angular Velocity {} (rad/s)")),
+    ],
+)
+def test_peaks_of_each_axis_are_no_axes_where_these_are_clear_without_them(heading: str, of: slice) -> None:
+    peaks = np.abs(six_axis()[:, of]).max(axis=0)
+    record = one(of_each_axis(heading, np.tile(peaks, (40, 1))))
+    assert mismatches(record) == []
+    np.testing.assert_array_equal(record.recording.linear_acceleration.values, six_axis()[:, :3])
+    np.testing.assert_array_equal(record.recording.angular_velocity.values, six_axis()[:, 3:])
+    lone = csv_text(np.column_stack([six_axis(), np.full(40, peaks[0])]), heading=f"{GENERIC},{heading.format('x')}")
+    assert mismatches(one(lone)) == []
+
+
+def test_samples_that_are_called_peaks_are_read_alone_and_ask_for_a_mapping_beside_others() -> None:
+    named = GENERIC.replace("ax_g,ay_g,az_g", "PLA x (g),PLA y (g),PLA z (g)")
+    np.testing.assert_array_equal(one(csv_text(heading=named)).recording.linear_acceleration.values, six_axis()[:, :3])
+    both = of_each_axis("PLA {} (g)", 1.1 * six_axis()[:, :3])
+    assert codes(refused(both)) == [("/linear_acceleration", "heading-twice")]
+    for columns in ("a{}_g", "PLA {} (g)"):
+        chosen = {"unit": "g", **{axis: columns.format(axis) for axis in "xyz"}}
+        turns = {"unit": "rad/s", **{axis: f"w{axis}_rad_s" for axis in "xyz"}}
+        mapping = Mapping.model_validate({"linear_acceleration": chosen, "angular_velocity": turns})
+        for preset in (None, "generic_six_axis"):
+            values = one(
+                both, mapping=mapping, preset=preset, sample_rate_hz=1000.0
+            ).recording.linear_acceleration.values
+            np.testing.assert_array_equal(values, (1.0 if columns == "a{}_g" else 1.1) * six_axis()[:, :3])
+
+
+def test_samples_in_lists_that_are_called_peaks_ask_for_a_mapping_too() -> None:
+    values = noise()
+    columns = {f"{name}{axis}_g": values[:, :, place] for name in ("a", "PLA ") for place, axis in enumerate("xyz")}
+    table = pa.table({name: pa.array(cells.tolist()) for name, cells in columns.items()})
+    assert codes(refused(parquet(table), sample_rate_hz=1000.0)) == [("/linear_acceleration", "heading-twice")]
 
 
 def test_a_cell_that_is_no_number_is_compared_with_nothing() -> None:

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import invalid_parameter
+from headimpact_service.ingest.axis_peaks import axis_peaks, without
 from headimpact_service.ingest.headings import Headings, Vocabulary
 from headimpact_service.ingest.impact_json import FilterBody, Strict
 from headimpact_service.ingest.mapping import DateAndTime, Mapping, SignalColumns
@@ -44,8 +45,12 @@ class Preset(Strict):
         if self.vocabulary is None:
             own = _with_units(self.mapping, headings) if "units" in self.requires else self.mapping
             return _with_names(own, headings)
-        spoken = _vocabulary(self.name).mapping(headings)
+        spoken = _vocabulary(self.name).mapping(without(headings, self.axis_peaks(headings)))
         return spoken.model_copy(update={name: getattr(self.mapping, name) for name in self.mapping.model_fields_set})
+
+    def axis_peaks(self, headings: Headings) -> dict[int, SignalName]:
+        """The columns of each axis' peak that its vocabulary would take for a signal's, each with the signal."""
+        return {} if self.vocabulary is None else axis_peaks(_vocabulary(self.name), headings)
 
     def fits(self, headings: Headings) -> bool:
         """Whether a table with these headings is of this layout: every signal's columns are there.
