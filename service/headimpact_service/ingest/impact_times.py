@@ -122,7 +122,7 @@ class ImpactTimes:
             for one in self.layout.others.clocks
             if one.may_count and one.milliseconds is not None
         ]
-        alike = (one for one in others if go_on_alike(self._times_ms(first), self._times_ms(one)))
+        alike = [one for one in others if go_on_alike(self._times_ms(first), self._times_ms(one))]
         return [*self.layout.clocks, *filter(self._has_trigger, alike)]
 
     def other_origins(self) -> Iterator[QualityNote]:
@@ -146,7 +146,8 @@ class ImpactTimes:
                 yield QualityNote("time_origin_mismatch", "note", f"{apart}: column {self.clock.column + 1} was read.")
 
     def _times_ms(self, clock: Clock) -> FloatArray:
-        return self.samples.numbers[clock.column][self.rows] * clock.milliseconds
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers that are beyond all times
+            return self.samples.numbers[clock.column][self.rows] * clock.milliseconds
 
     def _has_trigger(self, clock: Clock) -> bool:
         """Whether a column of times goes from below zero to zero or above."""
@@ -180,7 +181,8 @@ class ImpactTimes:
         if stamps.size < MIN_STAMPS or not (steps > 0.0).all() or (milliseconds is None and (steps == 1.0).all()):
             return
         units = TIME_UNITS.values() if milliseconds is None else [milliseconds]
-        said = [_rate_and_rounding(stamps * unit) for unit in units]
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers that are beyond all times
+            said = [_rate_and_rounding(stamps * unit) for unit in units]
         if not any(_is_among(rate, rates, OTHER_CLOCK + rounding) for rate, rounding in said):
             raise _other(heading, said[0][0])
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from binary_files import COLUMNS, npz, pa, parquet
-from ingest_files import codes, one, read, refused, six_axis
+from ingest_files import codes, one, outcome, read, refused, six_axis
 from making import table
 
 from headimpact_service.ingest.mapping import Mapping
@@ -317,3 +317,10 @@ def test_a_rate_that_a_line_above_the_headings_states_is_held_against_the_one_be
     assert rates(one(text, sample_rate_hz=2000.0)) == [2000.0, 2000.0]
     filtered = b"Device,MG 7\nFilter frequency (Hz),300\n" + below
     assert rates(one(filtered, sample_rate_hz=1000.0)) == [1000.0, 1000.0]
+
+
+@pytest.mark.parametrize("heading", ["Event Time (s)", "t2", "Time since trigger (s)"])
+def test_numbers_that_are_beyond_all_times_are_an_answer_and_no_error(heading: str):
+    for other in (lambda n: 1e305 * (n + 1), lambda n: -1e306 + 1e304 * n, lambda n: 1e-300 * n):
+        for item in outcome(timed(heading, other)):
+            assert isinstance(item, ImpactRecord) or item.status == 422
