@@ -19,7 +19,7 @@ from headimpact_service.ingest.unread import Unread, unread_columns
 def with_other_times(layout: Layout, headings: Headings, table: Table, *, rates: bool) -> Layout:
     """The layout, with the columns beside it that may say other times or, where they count, other rates."""
     read = {*layout.numbers, *layout.texts}
-    others = other_times(headings, read, table.has_samples, times_of(headings))
+    others = other_times(headings, read, table, times_of(headings))
     if not rates:
         return replace(layout, others=replace(others, rates=()))
     return replace(layout, others=replace(others, stated=tuple(stated_above(table.above))))

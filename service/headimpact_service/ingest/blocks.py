@@ -48,7 +48,7 @@ def are_named_apart(cells: Sequence[str]) -> bool:
 
 def tell_parts(cells: Sequence[str]) -> bool:
     """Whether a column parts its rows as impacts are parted, whatever it is called: in blocks, or counting anew."""
-    return lie_in_blocks(cells) or _lie_in_long_blocks(cells) or _count_up(_blocks(cells)) or _counts_anew(cells)
+    return lie_in_blocks(cells) or lie_in_long_blocks(cells) or _count_up(_blocks(cells)) or _counts_anew(cells)
 
 
 def count_triggers(cells: Sequence[str]) -> bool:
@@ -58,7 +58,7 @@ def count_triggers(cells: Sequence[str]) -> bool:
 
 def mark_blocks(cells: Sequence[str]) -> bool:
     """Whether marks, of which yes and no are none, lie in blocks as names of impacts do."""
-    return not _are_yes_or_no(set(map(said, cells))) and (lie_in_blocks(cells) or _lie_in_long_blocks(cells))
+    return not _are_yes_or_no(set(map(said, cells))) and (lie_in_blocks(cells) or lie_in_long_blocks(cells))
 
 
 def peaks_lie_in_blocks(cells: Sequence[str]) -> bool:
@@ -75,7 +75,7 @@ def lie_in_blocks(cells: Sequence[str]) -> bool:
     return _two_are_equal(_blocks(cells))
 
 
-def _lie_in_long_blocks(cells: Sequence[str]) -> bool:
+def lie_in_long_blocks(cells: Sequence[str]) -> bool:
     """Whether values, measured ones too, have many rows each, and two as many, or three and more nearly as many."""
     blocks = _lengths(cells, LONG)
     return not _are_yes_or_no(blocks) and (_two_are_equal(blocks) or _are_nearly_equal(blocks))

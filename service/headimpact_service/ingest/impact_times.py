@@ -160,8 +160,8 @@ class ImpactTimes:
         for other_rate in self.layout.others.rates:
             distinct = labels.all_said(other_rate.column)  # a rate is the same in all rows
             said = number_said(distinct[0]) if len(distinct) == 1 else None
-            if said is not None and not _is_among(said * other_rate.hertz, rates, OTHER_CLOCK):
-                raise _other(other_rate.heading, said * other_rate.hertz)
+            if said is not None and not _is_among(other_rate.rate_of(said), rates, OTHER_CLOCK):
+                raise _other(other_rate.heading, other_rate.rate_of(said))
         for name, stated in self.layout.others.stated:
             if not _is_among(stated, rates, OTHER_CLOCK):
                 raise _other(name, stated, what="line")

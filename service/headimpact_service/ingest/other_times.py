@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 
 from headimpact_service.ingest.cells import number_said
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS
 from headimpact_service.ingest.spelling import compact
-from headimpact_service.ingest.time_headings import hertz_of_rates, may_be_times, unit_of_times
+from headimpact_service.ingest.table import Table
+from headimpact_service.ingest.time_headings import (
+    hertz_of_rates,
+    may_be_times,
+    names_trigger,
+    period_of_samples,
+    unit_of_times,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +35,18 @@ class OtherClock:
 
 @dataclass(frozen=True, slots=True)
 class OtherRate:
-    """A column of samples per second, or of so many, that no signal is read by."""
+    """A column of samples per second, or of so many, that no signal is read by, or of their period."""
 
     column: int
     heading: str
     hertz: float
+    period_ms: float | None = None
+
+    def rate_of(self, said: float) -> float:
+        """The rate that a number in it says [Hz]; none of a period says infinitely many."""
+        if self.period_ms is None:
+            return said * self.hertz
+        return 1000.0 / (said * self.period_ms) if said > 0.0 else inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +72,7 @@ def stated_above(rows: Sequence[Sequence[str]]) -> Iterator[tuple[str, float]]:
             yield name, said * hertz
 
 
-def other_times(
-    headings: Headings, read: Collection[int], has_samples: Callable[[int], bool], times: Collection[int]
-) -> OtherTimes:
+def other_times(headings: Headings, read: Collection[int], table: Table, times: Collection[int]) -> OtherTimes:
     """The columns of times and of rates beside those that are read.
 
     Parameters
@@ -68,8 +81,8 @@ def other_times(
         The table's headings.
     read
         The columns that are read.
-    has_samples
-        Whether a column may hold a number for each sample.
+    table
+        The table, which knows what its columns may hold.
     times
         The columns whose headings are words for the samples' times.
     """
@@ -79,10 +92,13 @@ def other_times(
     for column, heading in enumerate(headings.written):
         if column in read:
             continue
-        is_dated = column in headings.dated
-        if (is_dated or may_be_times(heading)) and has_samples(column):
-            unit = DATES_IN if is_dated else unit_of_times(heading, headings.units.get(column))
-            clocks.append(OtherClock(column, heading, None if unit is None else TIME_UNITS[unit], column in times))
-        elif (hertz := hertz_of_rates(heading, headings.units.get(column), fs_is_rate=fs_is_rate)) is not None:
-            rates.append(OtherRate(column, heading, hertz))
+        beside, is_dated = headings.units.get(column), column in headings.dated
+        period_ms = period_of_samples(heading, beside)
+        hertz = hertz_of_rates(heading, beside, fs_is_rate=fs_is_rate)
+        if (period_ms is not None or hertz is not None) and column not in table.wordless:
+            rates.append(OtherRate(column, heading, hertz or 1.0, period_ms))
+        elif (is_dated or may_be_times(heading)) and table.has_samples(column):
+            may_count = column in times or names_trigger(heading)
+            unit = DATES_IN if is_dated else unit_of_times(heading, beside)
+            clocks.append(OtherClock(column, heading, None if unit is None else TIME_UNITS[unit], may_count))
     return OtherTimes(tuple(clocks), tuple(rates))

@@ -14,6 +14,7 @@ from headimpact_service.ingest.blocks import (
     are_several,
     begins_anew,
     count_triggers,
+    lie_in_long_blocks,
     mark_blocks,
     peaks_lie_in_blocks,
     tell_parts,
@@ -84,6 +85,7 @@ class RowLabels:
             (unread.marks, mark_blocks, _SAY),
             (unread.triggers, count_triggers, _SAY),
             (unread.peaks, peaks_lie_in_blocks, _SAY),
+            ((*unread.measured, *(unread.times if unread.alone else ())), lie_in_long_blocks, _SAY),
         ):
             for column in columns:
                 if tell(self._cells(column)):

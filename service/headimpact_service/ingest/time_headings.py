@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from headimpact.recording import SignalName
+from headimpact_service.ingest.mapping import TIME_UNITS
 from headimpact_service.ingest.spelling import unit_ending, unit_spelled
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
@@ -36,9 +37,14 @@ _RATES = frozenset(
     }
 )
 _RATE = frozenset({"rate", "frequency", "freq"})
-_OF_SAMPLES = frozenset({"sample", "samples", "sampling", "acquisition"})
+_OF_SAMPLES = frozenset({"sample", "samples", "sampling", "acquisition", "logging"})
+_TRIGGER = frozenset({"trigger", "triggered", "rel", "relative", "contact", "zero"})
+_PERIODS = frozenset({"dt", "interval", "period", "step"})
 _ALONE = frozenset(
-    {*("odr", "sr", "samplerate", "samplingrate", "samplefreq", "samplingfreq", "samplefrequency", "samplingfrequency")}
+    {
+        *("odr", "sr", "sps", "abtastrate", "samplerate", "samplingrate"),
+        *("samplefreq", "samplingfreq", "samplefrequency", "samplingfrequency"),
+    }
 )
 _NOT_OF_SAMPLES = frozenset(
     {
@@ -72,6 +78,21 @@ def may_be_times(heading: str) -> bool:
         return False
     spoken = bool(words & (_TIMES | _INSIDE)) or any(map(_TIME_OF_ONE.fullmatch, words))
     return spoken or (bool(words & _ANY_SENSOR) and unit_of_times(heading, None) is not None)
+
+
+def names_trigger(heading: str) -> bool:
+    """Whether a heading of times says that they count from the trigger."""
+    words = _words(heading)
+    return bool(words & _TIMES and words & _TRIGGER)
+
+
+def period_of_samples(heading: str, beside: str | None) -> float | None:
+    """Milliseconds that make one of what a column of the samples' period may say; None for any other heading."""
+    words = _words(heading)
+    if words & (_NOT_OF_SAMPLES | _OF_SIGNALS) or not words & _PERIODS:
+        return None
+    unit = unit_of_times(heading, beside)
+    return None if unit is None or not words & (_OF_SAMPLES | _ANY_SENSOR | {"dt"}) else TIME_UNITS[unit]
 
 
 def unit_of_times(heading: str, beside: str | None) -> str | None:

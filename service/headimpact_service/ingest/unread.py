@@ -75,6 +75,7 @@ class Unread:
     others: tuple[int, ...] = ()
     marks: tuple[int, ...] = ()
     triggers: tuple[int, ...] = ()
+    measured: tuple[int, ...] = ()
     peaks: tuple[int, ...] = ()
     hints: tuple[int, ...] = ()
     """Names that tell nothing where samples have times, but how to part the rows if these begin anew."""
@@ -93,7 +94,7 @@ class Unread:
     def watched(self) -> tuple[int, ...]:
         """Those that must say the same, or count on, within an impact."""
         told = (*self.names, *self.times, *self.counters, *self.others)
-        return (*told, *self.marks, *self.triggers, *self.peaks)
+        return (*told, *self.marks, *self.triggers, *self.peaks, *self.measured)
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -120,7 +121,7 @@ def unread_columns(
         words = {word.lower() for word in _WORD.findall(heading)}
         if column in passed or (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
             continue
-        if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks", "triggers"}:
+        if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks", "triggers", "measured"}:
             found.setdefault(kind, []).append(column)
     columns: dict[str, Any] = {kind: tuple(of_kind) for kind, of_kind in found.items()}
     return Unread(**columns, alone=alone)
@@ -133,7 +134,7 @@ def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> st
     if words & _TIMES:
         return None if timed else "times"
     if words & _MEASURED:
-        return None
+        return "measured" if alone else None
     if words & _MARKS:
         counted = words & (_NAMES | _PARTS | _COUNTS) and not words & _STATES
         return None if not alone else "triggers" if counted else "marks"

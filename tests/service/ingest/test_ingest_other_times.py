@@ -324,3 +324,37 @@ def test_numbers_that_are_beyond_all_times_are_an_answer_and_no_error(heading: s
     for other in (lambda n: 1e305 * (n + 1), lambda n: -1e306 + 1e304 * n, lambda n: 1e-300 * n):
         for item in outcome(timed(heading, other)):
             assert isinstance(item, ImpactRecord) or item.status == 422
+
+
+@pytest.mark.parametrize(
+    "heading", ["Gyro dt (ms)", "dt_ms", "Sample interval (ms)", "gyro_period_ms", "sampling step ms"]
+)
+def test_a_period_at_which_no_signal_is_read_is_refused(heading: str):
+    rows = [[n, *row, 0.5] for n, row in enumerate(six_axis().tolist())]
+    assert codes(refused(table(["t_ms", *SIX, heading], rows))) == [("sample_rate_hz", "rate-differs")]
+    rows = [[*row[:-1], 1.0] for row in rows]
+    assert rates(one(table(["t_ms", *SIX, heading], rows))) == [1000.0, 1000.0]
+
+
+@pytest.mark.parametrize("heading", ["sps", "gyro_sps", "Abtastrate (Hz)", "Logging rate", "Gyro Samples per second"])
+def test_more_words_for_rates_are_known(heading: str):
+    rows = [[n, *row, 2000] for n, row in enumerate(six_axis().tolist())]
+    assert codes(refused(table(["t_ms", *SIX, heading], rows))) == [("sample_rate_hz", "rate-differs")]
+
+
+@pytest.mark.parametrize(
+    "heading", ["t_rel_ms", "Time re trigger (ms)", "Trigger Time (ms)", "Time after contact (ms)"]
+)
+def test_times_that_name_the_trigger_count_from_it(heading: str):
+    record = one(timed(heading, lambda n: n - 10))
+    assert record.recording.pre_trigger_ms == 10.0
+    assert [note.code for note in record.notes] == ["time_origin_mismatch"]
+
+
+def test_lists_of_samples_that_are_called_a_rate_are_no_rate():
+    lists = dict(zip(SIX, ([column.tolist()] for column in six_axis().T), strict=True))
+    columns: dict[str, Any] = {
+        "t_ms": [[float(n) for n in range(40)]],
+        "Gyro Rate (Hz)": [[float(n) for n in range(40)]],
+    }
+    assert rates(one(parquet(pa.table(columns | lists)))) == [1000.0, 1000.0]

@@ -394,3 +394,25 @@ def test_rows_with_several_ids_are_not_one_impact_whatever_is_said(timed: bool):
     problem = refused(keyed("x1", lambda n: 1, timed), mapping=Mapping.model_validate({"group_by": []}), **beside)
     assert codes(problem) == [(None, "several-impacts")]
     assert "Column 1 (impact_id)" in problem.detail
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [
+        ("Event Time", ["19:05:06", "19:05:07", "19:05:08"]),
+        ("Impact Time (s)", [1.5, 2.1, 2.4]),
+        ("Speed (m/s)", [3.5, 4.5, 5.5]),
+        ("Impact Force", [1, 2, 3]),
+        ("Test Temp", [20.5, 21.5, 22.5]),
+    ],
+)
+def test_what_is_measured_once_an_impact_parts_the_rows(heading: str, cells: list[Any]):
+    rows = [[cell, *row] for cell in cells for row in six_axis(60).tolist()]
+    problem = refused(table([heading, *COLUMNS], rows), sample_rate_hz=1000.0)
+    assert codes(problem) == [(None, "several-impacts")]
+
+
+@pytest.mark.parametrize("heading", ["Temp", "Battery", "Speed (m/s)"])
+def test_what_a_slow_sensor_measures_parts_nothing(heading: str):
+    rows = [[20.5 + n // 20, *row] for n, row in enumerate(six_axis(100).tolist())]
+    assert shape(one(table([heading, *COLUMNS], rows), sample_rate_hz=1000.0)) == 100
