@@ -207,7 +207,7 @@ def refit_criterion(
     weights = _population_weights(sample, options)
     by_impact = _bootstrap(sample, score, resamples.by_impact, ml)
     by_athlete = replace(_bootstrap(sample, score, resamples.by_athlete, ml), reason=too_few)
-    folded = _tried(lambda: out_of_fold(sample, setting.folds[rows]))
+    folded = tried(lambda: out_of_fold(sample, setting.folds[rows]))
     return CriterionRefit(
         name=name,
         sample=sample,
@@ -228,7 +228,7 @@ def refit_criterion(
         by_impact=by_impact,
         by_athlete=by_athlete,
         out_of_fold=folded,
-        optimism=_tried(
+        optimism=tried(
             lambda: optimism(sample, resamples.by_impact, by_impact.refits.coefficients, by_impact.refits.converged)
         ),
         thresholds=_thresholds(sample.y, score, resamples, options),
@@ -249,7 +249,7 @@ def _in_sample(active: FloatArray, sample: Sample, options: RefitOptions) -> Flo
 
 
 def _closed_test(sample: Sample, active: FloatArray, options: RefitOptions) -> ClosedTest | str:
-    return _tried(lambda: closed_test(sample, _in_sample(active, sample, options), options.alpha))
+    return tried(lambda: closed_test(sample, _in_sample(active, sample, options), options.alpha))
 
 
 def _linear(sample: Sample, firth: FirthFit | None) -> FloatArray:
@@ -361,7 +361,7 @@ def _sample_size(ml: LogisticFit | None) -> SampleSize | None:
     return riley_sample_size(r_squared, ml.sample.x.shape[1], share)
 
 
-def _tried(work: Callable[[], Result]) -> Result | str:
+def tried(work: Callable[[], Result]) -> Result | str:
     """What the work gives, or why it cannot be had."""
     try:
         return work()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import isfinite
 from typing import Any
 
@@ -9,8 +10,8 @@ import numpy as np
 from scipy.special import expit
 
 from headimpact.calibration.agreement import Agreement, hosmer_lemeshow, spiegelhalter
-from headimpact.calibration.criterion_refit import Bootstrap, CriterionRefit, Threshold
-from headimpact.calibration.firth import FirthFit, Profile
+from headimpact.calibration.criterion_refit import Bootstrap, CriterionRefit, Threshold, tried
+from headimpact.calibration.firth import Profile
 from headimpact.calibration.logistic import FloatArray
 from headimpact.calibration.rare_events import prior_offset
 from headimpact.calibration.refit import Comparison, Refit, coefficient_names
@@ -20,7 +21,6 @@ from headimpact.calibration.thresholds import Confusion
 from headimpact.calibration.update import ChiSquareTest, ClosedTest
 from headimpact.calibration.validation import Optimism, OutOfFold
 from headimpact.criteria import BY_KEY
-from headimpact.errors import CalibrationError
 
 FORMAT = "headimpact-refit/1"
 
@@ -163,7 +163,7 @@ def _test(test: ChiSquareTest) -> dict[str, Any]:
 def _firth(one: CriterionRefit, names: list[str]) -> dict[str, Any]:
     if one.firth is None:
         return {}
-    profiles = {name: _profile(one.firth, i) for i, name in enumerate(names)}
+    profiles: dict[str, Profile | str] = {name: tried(partial(one.firth.profile, i)) for i, name in enumerate(names)}
     return {
         "firth": {
             "coefficients": _named(names, one.firth.coefficients),
@@ -178,14 +178,6 @@ def _firth(one: CriterionRefit, names: list[str]) -> dict[str, Any]:
             "calibrated_intercept": float(one.firth.with_calibrated_intercept[0]),
         }
     }
-
-
-def _profile(found: FirthFit, which: int) -> Profile | str:
-    """The profile of a coefficient, or why it has none."""
-    try:
-        return found.profile(which)
-    except CalibrationError as error:
-        return str(error)
 
 
 def _auc(one: CriterionRefit, level: float, found: Refit) -> dict[str, Any]:

@@ -17,8 +17,7 @@ from headimpact_service.ingest.spelling import compact, vocabulary
 def axis_peaks(spoken: Vocabulary, headings: Headings) -> dict[int, SignalName]:
     """The columns that are called peaks of a signal whose three axes other headings name, each with the signal."""
     found: dict[int, SignalName] = {}
-    told = zip(headings.written, headings.spoken, strict=True)
-    meanings = [spoken.understand(said) or spoken.understand(heading) for heading, said in told]
+    meanings = spoken.meanings(headings)
     for signal in SIGNALS:
         axes = {place: meaning.axis for place, meaning in enumerate(meanings) if meaning and meaning.signal == signal}
         peaks = [column for column in axes if _is_peak(signal, headings.written[column])]

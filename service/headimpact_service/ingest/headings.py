@@ -157,6 +157,11 @@ class Vocabulary:
         """What a heading says, if it is made of known words; one too long for a mapping says nothing."""
         return self._meanings.get(compact(heading)) if len(heading) <= MAX_COMPACT else None
 
+    def meanings(self, headings: Headings) -> list[Meaning | None]:
+        """What each heading says with the unit beside it or, where that says nothing, as it is written."""
+        told = zip(headings.written, headings.spoken, strict=True)
+        return [self.understand(said) or self.understand(heading) for heading, said in told]
+
     def components(self, headings: Headings) -> dict[SignalName, list[str]]:
         """For each signal, three headings that begin with words for its components and go on alike, however they do."""
         found: dict[tuple[SignalName, str], dict[str, str]] = {}
@@ -181,10 +186,7 @@ class Vocabulary:
 
     def mapping(self, headings: Headings) -> mappings.Mapping:
         """The mapping that a table's headings, each with the unit beside it, amount to."""
-        understood = [
-            (heading, self.understand(said) or self.understand(heading))
-            for heading, said in zip(headings.written, headings.spoken, strict=True)
-        ]
+        understood = zip(headings.written, self.meanings(headings), strict=True)
         found = [(heading, meaning) for heading, meaning in understood if meaning is not None]
         fields: dict[str, Any] = {}
         for signal in SIGNALS:
