@@ -203,6 +203,12 @@ async def write(request: Request, change: Callable[[Connection], T]) -> T:
     return await database.write_async(change)
 
 
+async def write_short(request: Request, change: Callable[[Connection], T]) -> T:
+    """The same for a change of a few rows, as it is sent many times a second."""
+    database: Database = request.app.state.database
+    return await database.write_short(change)
+
+
 async def submit(request: Request, data_set_id: bytes, new: NewJob) -> Job:
     """Order a job; the job that its idempotency key made before, if there is one."""
     job = await write(request, lambda conn: jobs.submit(conn, data_set_id, new))

@@ -80,7 +80,7 @@ async def _stored(call: Call, change: Callable[[NewImpact, Any], Outcome]) -> tu
     while True:
         scored, new = await _scored(call, record)
         try:
-            return await deps.write(call.request, partial(change, new)), scored
+            return await deps.write_short(call.request, partial(change, new)), scored
         except ScoreOutdated:
             tries += 1
             if tries == TRIES:

@@ -15,6 +15,7 @@ from sqlalchemy.exc import ArgumentError, DBAPIError, SQLAlchemyError
 
 from headimpact_service.store import disk, migrate, postgresql, sqlite
 from headimpact_service.store.access import Access, DatabaseUrlError
+from headimpact_service.store.gathered import STANDSTILL_S, Gathered
 from headimpact_service.store.unavailable import is_out_of_reach, unavailable
 from headimpact_service.store.writer import Writer
 
@@ -41,6 +42,7 @@ class Database:
         self._reading = self._engine(Access.READ, pool_size=readers, max_overflow=4 * readers)
         self._writing = self._engine(Access.WRITE)
         self._writer = Writer(self._writing, capacity=queue_capacity, batch=batch)
+        self._gathered = Gathered(self._writer, standstill_s=STANDSTILL_S if self.is_file else 0.0)
 
     @contextmanager
     def read(self) -> Iterator[Connection]:
@@ -64,6 +66,10 @@ class Database:
     async def write_async(self, run: Callable[[Connection], T]) -> T:
         """The same from an event loop. Cancelling the wait does not undo the write."""
         return await self._writer.write_async(run)
+
+    async def write_short(self, run: Callable[[Connection], T]) -> T:
+        """The same for a function that writes a few rows: those of one turn of the loop share a commit."""
+        return await self._gathered.write(run)
 
     def migrate(self, revision: str = "head") -> None:
         """Bring the schema to this version; safe when several processes start at once."""

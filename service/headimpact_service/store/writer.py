@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 
 @dataclass(slots=True)
-class _Write:
+class Write:
     """One queued function, and what became of it."""
 
     run: Callable[[Connection], Any]
@@ -33,9 +33,15 @@ class _Write:
     loop: asyncio.AbstractEventLoop | None
     result: Any = None
     error: BaseException | None = None
+    filled: Callable[[], None] | None = None
+    """Called once, by the writing thread, when its transaction holds it or has failed, before the commit."""
+    answered: Callable[[], None] | None = None
+    """Called by whoever answers it."""
 
     def resolve(self) -> None:
         """Answer whoever waits, unless they left."""
+        if self.answered is not None:
+            self.answered()
         if self.waiter.done():
             return
         if self.error is not None:
@@ -56,23 +62,24 @@ class Writer:
         self._engine = engine
         self._capacity = capacity
         self._batch = batch
-        self._queue: SimpleQueue[_Write | None] = SimpleQueue()
+        self._queue: SimpleQueue[Write | None] = SimpleQueue()
         self._lock = threading.Lock()
         self._closed = False
+        self._idle = True
         self._thread: threading.Thread | None = None
         self._conn: Connection | None = None
 
     def write(self, run: Callable[[Connection], T]) -> T:
         """Run a function in a write transaction and return its result once that is committed."""
         waiter: Future[T] = Future()
-        self._submit(_Write(run, waiter, None))
+        self.submit([Write(run, waiter, None)])
         return waiter.result()
 
     async def write_async(self, run: Callable[[Connection], T]) -> T:
         """The same without blocking the event loop. Cancelling the wait does not undo the write."""
         loop = asyncio.get_running_loop()
         waiter: asyncio.Future[T] = loop.create_future()
-        self._submit(_Write(run, waiter, loop))
+        self.submit([Write(run, waiter, loop)])
         return await waiter
 
     def close(self) -> None:
@@ -89,7 +96,13 @@ class Writer:
         """About how many writes are queued."""
         return self._queue.qsize()
 
-    def _submit(self, write: _Write) -> None:
+    @property
+    def is_idle(self) -> bool:
+        """Whether the thread waits for something to write."""
+        return self._idle
+
+    def submit(self, writes: Sequence[Write]) -> None:
+        """Queue them behind one another; their waiters are answered. 503 where they cannot be taken."""
         with self._lock:
             if self._closed:
                 raise unavailable("The service is shutting down.")
@@ -98,18 +111,21 @@ class Writer:
             if self._thread is None:
                 self._thread = threading.Thread(target=self._work, name="headimpact-writer", daemon=True)
                 self._thread.start()
-            self._queue.put(write)
+            for write in writes:
+                self._queue.put(write)
 
     def _work(self) -> None:
         """Until closed: take what is queued, write it, answer it."""
         closing = False
         while not closing and (first := self._queue.get()) is not None:
+            self._idle = False
             group, closing = self._collect(first)
             self._write_group(group)
+            self._idle = True
             _answer(group)
         self._leave()
 
-    def _collect(self, first: _Write) -> tuple[list[_Write], bool]:
+    def _collect(self, first: Write) -> tuple[list[Write], bool]:
         """The writes that share the next commit, and whether the queue was closed behind them."""
         group = [first]
         while len(group) < self._batch:
@@ -122,14 +138,14 @@ class Writer:
             group.append(item)
         return group, False
 
-    def _write_group(self, group: list[_Write]) -> None:
+    def _write_group(self, group: list[Write]) -> None:
         """One transaction for all; if that fails, one for each."""
         if self._commit(group) or len(group) == 1:
             return
         for write in group:
             self._commit([write])
 
-    def _commit(self, group: list[_Write]) -> bool:
+    def _commit(self, group: list[Write]) -> bool:
         """Run a group in one transaction; True if each of it has its answer.
 
         False means that one of several failed after writing: everything is rolled back and nothing is answered yet.
@@ -139,10 +155,13 @@ class Writer:
             with transaction:
                 for write in group:
                     _run(write, conn, alone=len(group) == 1)
+                _filled(group)
         except _GroupError:
             return False
         except BaseException as error:  # the thread must outlive whatever a function raises
             return _blame(group, error)
+        finally:
+            _filled(group)
         return True
 
     def _begin(self) -> tuple[Connection, RootTransaction]:
@@ -174,7 +193,7 @@ class _GroupError(Exception):
     """A function of a group failed after it may have written."""
 
 
-def _run(write: _Write, conn: Connection, *, alone: bool) -> None:
+def _run(write: Write, conn: Connection, *, alone: bool) -> None:
     """Run one function of a transaction.
 
     A problem raised before anything was written is its answer; the others of the group are not touched by it.
@@ -192,13 +211,21 @@ def _run(write: _Write, conn: Connection, *, alone: bool) -> None:
         raise _GroupError from error
 
 
+def _filled(group: list[Write]) -> None:
+    """Tell whoever stands still for a write of the group to go on."""
+    for write in group:
+        if write.filled is not None:
+            write.filled()
+            write.filled = None
+
+
 def _changes(conn: Connection) -> int | None:
     """How many rows this connection has ever changed, where the driver counts them."""
     changes: int | None = getattr(conn.connection.dbapi_connection, "total_changes", None)
     return changes
 
 
-def _blame(group: list[_Write], error: BaseException) -> bool:
+def _blame(group: list[Write], error: BaseException) -> bool:
     """Answer a group whose transaction failed; False if its members are to be tried alone."""
     if len(group) > 1 and not _began_or_ended_badly(error):
         return False
@@ -219,9 +246,9 @@ def _began_or_ended_badly(error: BaseException) -> bool:
     return is_out_of_reach(error) and (getattr(error, "statement", None) or "BEGIN").startswith("BEGIN")
 
 
-def _answer(group: list[_Write]) -> None:
+def _answer(group: list[Write]) -> None:
     """Wake whoever waits: threads at once, each event loop once for all its writes."""
-    loops: dict[asyncio.AbstractEventLoop, list[_Write]] = {}
+    loops: dict[asyncio.AbstractEventLoop, list[Write]] = {}
     for write in group:
         if write.loop is None:
             write.resolve()
@@ -232,6 +259,6 @@ def _answer(group: list[_Write]) -> None:
             loop.call_soon_threadsafe(_resolve, writes)
 
 
-def _resolve(writes: list[_Write]) -> None:
+def _resolve(writes: list[Write]) -> None:
     for write in writes:
         write.resolve()
