@@ -14,6 +14,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
+from threading import local
 from typing import NamedTuple
 
 import numpy as np
@@ -31,9 +32,9 @@ SINGLE, DOUBLE = 4, 8
 DECIMAL = 16
 """The form of multiples of 10^-d is this plus d."""
 DIGITS = (2, 4, 6)
+_SCALES = np.array([10.0**digits for digits in DIGITS])[:, None]
 _GLANCE = 8
-_MANY = 4
-"""Impacts from which on it is cheaper to put them together."""
+_of_this_thread = local()
 _TOGETHER = 64 * 1024
 """Samples that are put into their form together: what of them is held in between stays in the processor's cache."""
 
@@ -51,124 +52,98 @@ class _Stored(NamedTuple):
 
 def encode(signals: Mapping[str, FloatArray]) -> bytes:
     """Arrays of float64 with one or two dimensions, by name, as bytes."""
-    header = bytearray((CODEC, len(signals)))
-    planes = []
-    with np.errstate(over="ignore", invalid="ignore"):  # a form that cannot hold a value is not the one chosen
-        for name, values in signals.items():
-            stored = _stored(np.asarray(values, dtype=np.float64))
-            header += _entry(name, values.shape, stored.form)
-            planes.append(stored.plane)
-    return bytes(header) + zstandard.ZstdCompressor(write_checksum=True).compress(b"".join(planes))
-
-
-def _stored(values: FloatArray) -> _Stored:
-    """The values in the smallest form from which every bit comes back: what is written in decimals is no float32."""
-    rows = np.ascontiguousarray(values.T)
-    digits = _digits(rows)
-    if digits is not None:
-        whole = np.rint(rows * 10.0**digits).astype(np.int32)
-        if _same_bits(whole / 10.0**digits, rows):  # neither -0.0 nor a multiple beyond int32 comes back
-            return _Stored(DECIMAL + digits, _plane(_differences(whole.reshape(-1))))
-    single = rows.astype(np.float32)
-    if _same_bits(single.astype(np.float64), rows):
-        return _Stored(SINGLE, _plane(single.reshape(-1)))
-    return _Stored(DOUBLE, _plane(rows.reshape(-1)))
-
-
-def _plane(stored: NDArray[np.float32] | NDArray[np.float64] | NDArray[np.int32]) -> bytes:
-    """The bytes of an array, those of equal weight together."""
-    return stored.view(np.uint8).reshape(-1, stored.itemsize).T.tobytes()
-
-
-def _digits(rows: FloatArray) -> int | None:
-    """How many decimals the samples may have, by a glance at the first few."""
-    few = rows.reshape(-1)[:_GLANCE].tolist()
-    return next((digits for digits in DIGITS if all(round(value, digits) == value for value in few)), None)
-
-
-def _same_bits(found: FloatArray, values: FloatArray) -> bool:
-    return found.tobytes() == values.tobytes()
+    return encode_many([signals])[0]
 
 
 def encode_many(items: Sequence[Mapping[str, FloatArray]]) -> list[bytes]:
-    """The arrays of many impacts, each as :func:`encode` has them; those of equal names and shapes are put together."""
-    if len(items) < _MANY:
-        return [encode(signals) for signals in items]
-    groups: dict[tuple[tuple[str, tuple[int, ...]], ...], list[int]] = {}
+    """The arrays of many impacts, those of one size put into their form together."""
+    stored: list[dict[str, _Stored]] = [{} for _ in items]
+    alike: dict[int, list[tuple[int, str, FloatArray]]] = {}
     for index, signals in enumerate(items):
-        groups.setdefault(tuple((name, values.shape) for name, values in signals.items()), []).append(index)
-    compress = zstandard.ZstdCompressor(write_checksum=True).compress
-    encoded = [b""] * len(items)
-    for layout, members in groups.items():
-        columns = [_stored_many([items[index][name] for index in members]) for name, _ in layout]
-        for index, *arrays in zip(members, *columns, strict=True):
-            head = [_entry(name, shape, stored.form) for (name, shape), stored in zip(layout, arrays, strict=True)]
-            planes = b"".join([stored.plane for stored in arrays])
-            encoded[index] = bytes((CODEC, len(layout))) + b"".join(head) + compress(planes)
-    return encoded
+        for name, values in signals.items():
+            alike.setdefault(values.size, []).append((index, name, values))
+    for size, members in alike.items():
+        together = max(1, _TOGETHER // max(1, size))
+        for first in range(0, len(members), together):
+            part = members[first : first + together]
+            forms = _in_forms(np.array([values.T.reshape(-1) for _, _, values in part], dtype=np.float64))
+            for (index, name, _), form in zip(part, forms, strict=True):
+                stored[index][name] = form
+    return [_framed(signals, found) for signals, found in zip(items, stored, strict=True)]
 
 
-def _stored_many(arrays: Sequence[FloatArray]) -> list[_Stored]:
-    """Arrays of one shape in their forms."""
-    together = max(1, _TOGETHER // max(1, arrays[0].size))
-    stored: list[_Stored] = []
-    with np.errstate(over="ignore", invalid="ignore"):  # a form that cannot hold a value is not the one chosen
-        for first in range(0, len(arrays), together):
-            rows = [np.asarray(values, dtype=np.float64).T.reshape(-1) for values in arrays[first : first + together]]
-            stored += _in_forms(np.stack(rows))
-    return stored
+def _framed(signals: Mapping[str, FloatArray], stored: Mapping[str, _Stored]) -> bytes:
+    """The table of an impact's arrays, and all of them as one frame."""
+    head = [_entry(name, values.shape, stored[name].form) for name, values in signals.items()]
+    planes = b"".join([stored[name].plane for name in signals])
+    return bytes((CODEC, len(signals))) + b"".join(head) + _compressor().compress(planes)
+
+
+def _compressor() -> zstandard.ZstdCompressor:
+    """This thread's own: to make one costs as much as to use it."""
+    found: zstandard.ZstdCompressor | None = getattr(_of_this_thread, "compressor", None)
+    if found is None:
+        found = _of_this_thread.compressor = zstandard.ZstdCompressor(write_checksum=True)
+    return found
 
 
 def _in_forms(rows: FloatArray) -> list[_Stored]:
     """Rows in the smallest form from which every bit comes back: what is written in decimals is no float32."""
     found: dict[int, _Stored] = {}
-    digits = _digits_many(rows[:, :_GLANCE])
-    for form in DIGITS:
-        of_form = np.flatnonzero(digits == form)
-        if of_form.size:
-            values = rows[of_form]
+    digits = _digits(rows[:, :_GLANCE])
+    with np.errstate(over="ignore", invalid="ignore"):  # a form that cannot hold a value is not the one chosen
+        for form in {few for few in digits if few is not None}:
+            chosen = [row for row, few in enumerate(digits) if few == form]
+            values = _chosen(rows, chosen)
             whole = np.rint(values * 10.0**form).astype(np.int32)
             same = _same_rows(whole / 10.0**form, values)  # neither -0.0 nor a multiple beyond int32 comes back
-            found.update(_planes(of_form[same], DECIMAL + form, _differences(whole[same])))
-    rest = np.array([row for row in range(len(rows)) if row not in found], dtype=np.intp)
-    if rest.size:
-        values = rows[rest]
-        single = values.astype(np.float32)
-        same = _same_rows(single.astype(np.float64), values)
-        found.update(_planes(rest[same], SINGLE, single[same]))
-        found.update(_planes(rest[~same], DOUBLE, values[~same]))
+            found.update(_planes(chosen, same, DECIMAL + form, _differences(whole)))
+        rest = [row for row in range(len(rows)) if row not in found]
+        if rest:
+            values = _chosen(rows, rest)
+            single = values.astype(np.float32)
+            found.update(_planes(rest, _same_rows(single.astype(np.float64), values), SINGLE, single))
+            found.update(_planes(rest, [row not in found for row in rest], DOUBLE, values))
     return [found[row] for row in range(len(rows))]
 
 
-def _digits_many(few: FloatArray) -> NDArray[np.int64]:
-    """How many decimals the samples of each row may have, by a glance at the first few; -1 for none of ours."""
-    digits = np.full(len(few), -1, dtype=np.int64)
-    for form in reversed(DIGITS):
-        digits[(np.rint(few * 10.0**form) / 10.0**form == few).all(axis=1)] = form
-    return digits
+def _chosen(rows: FloatArray, chosen: list[int]) -> FloatArray:
+    return rows if len(chosen) == len(rows) else rows[chosen]
 
 
-def _same_rows(found: FloatArray, values: FloatArray) -> NDArray[np.bool_]:
+def _digits(few: FloatArray) -> list[int | None]:
+    """How many decimals the samples of each row may have, by a glance at the first few; None for none of ours."""
+    scaled = few[:, None] * _SCALES
+    may_be = (np.rint(scaled) / _SCALES == few[:, None]).all(axis=2)
+    return [next((digits for digits, fits in zip(DIGITS, row, strict=True) if fits), None) for row in may_be.tolist()]
+
+
+def _same_rows(found: FloatArray, values: FloatArray) -> list[bool]:
     """Of each row, whether all of it is the same."""
-    same: NDArray[np.bool_] = (found.view(np.int64) == values.view(np.int64)).all(axis=1)
+    same: list[bool] = (found.view(np.int64) == values.view(np.int64)).all(axis=1).tolist()
     return same
 
 
 def _differences(whole: NDArray[np.int32]) -> NDArray[np.int32]:
     """From sample to sample of each row, the first as it is. Beyond the range of int32 they wrap, there and back."""
     steps = whole.copy()
-    steps[..., 1:] -= whole[..., :-1]
+    steps[:, 1:] -= whole[:, :-1]
     return steps
 
 
 def _planes(
-    rows: NDArray[np.intp], form: int, stored: NDArray[np.float32] | NDArray[np.float64] | NDArray[np.int32]
+    rows: list[int],
+    fit: list[bool],
+    form: int,
+    stored: NDArray[np.float32] | NDArray[np.float64] | NDArray[np.int32],
 ) -> Iterator[tuple[int, _Stored]]:
-    """The bytes of each row, those of equal weight together."""
+    """The bytes of each row that fits the form, those of equal weight together."""
     count, size = stored.shape
-    parted = stored.view(np.uint8).reshape(count, size, stored.itemsize).transpose(0, 2, 1)
-    for row, plane in zip(rows.tolist(), np.ascontiguousarray(parted), strict=True):
-        yield row, _Stored(form, plane.tobytes())
+    planes = stored.view(np.uint8).reshape(count, size, stored.itemsize).transpose(0, 2, 1).tobytes()
+    length = size * stored.itemsize
+    for place, (row, fits) in enumerate(zip(rows, fit, strict=True)):
+        if fits:
+            yield row, _Stored(form, planes[place * length : (place + 1) * length])
 
 
 @lru_cache(maxsize=256)
