@@ -139,3 +139,25 @@ def test_the_filter_is_linear_and_keeps_an_offset(seed, samples, rate_hz):
     found = low_pass(2 * x - 3 * z + 5, corner, rate_hz)
     expected = 2 * low_pass(x, corner, rate_hz) - 3 * low_pass(z, corner, rate_hz) + 5
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 7, 10, 64, 100, filtering.SHORT])
+def test_the_product_of_a_short_record_is_what_the_recursion_gives(samples: int) -> None:
+    x = np.random.default_rng(samples).normal(0, 20, (5, 3, samples))
+    expected = filtering._recursion(x, 229.2, 1000.0)
+    np.testing.assert_allclose(low_pass(x, 229.2, 1000.0), expected, rtol=0, atol=1e-14 * np.abs(expected).max())
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 140), st.sampled_from([1000.0, 1600.0, 1007.3]))
+@settings(deadline=None, max_examples=60)
+def test_a_component_has_the_same_bits_wherever_it_stands(seed: int, samples: int, rate_hz: float) -> None:
+    """Alone, among others, under another name, turned over, and however it lies in memory."""
+    x = np.random.default_rng(seed).normal(0, 20, (4, 3, samples))
+    expected = low_pass(x, 229.2, rate_hz)
+    wide = np.empty((4, 5, samples + 3))
+    wide[:, 1:4, 2 : samples + 2] = x
+    np.testing.assert_array_equal(low_pass(wide[:, 1:4, 2 : samples + 2], 229.2, rate_hz), expected)
+    np.testing.assert_array_equal(low_pass(np.asfortranarray(x), 229.2, rate_hz), expected)
+    np.testing.assert_array_equal(low_pass(x[:, [2, 0, 1]], 229.2, rate_hz), expected[:, [2, 0, 1]])
+    np.testing.assert_array_equal(low_pass(-x, 229.2, rate_hz), -expected)
+    np.testing.assert_array_equal(low_pass(x[2, 1], 229.2, rate_hz), expected[2, 1])
