@@ -35,18 +35,18 @@ class Screen:
 
     extreme: FloatArray
     near_full_scale: FloatArray
-    linear: NDArray[np.intp]
-    rotational: NDArray[np.intp]
+    linear: slice
+    rotational: slice
 
     @classmethod
     def of(cls, channels: Sequence[Channel]) -> Screen:
         """The screen of these channels."""
-        linear = np.array([channel.signal == "linear_acceleration" for channel in channels])
+        linear = sum(channel.signal == "linear_acceleration" for channel in channels)  # they come first
         return cls(
             np.array([[highest_of(channel.signal, "extreme")] for channel in channels]),
             np.array([[near_full_scale(channel.declared_range)] for channel in channels]),
-            np.flatnonzero(linear),
-            np.flatnonzero(~linear),
+            slice(linear),
+            slice(linear, len(channels)),
         )
 
     def suspects(self, samples: FloatArray) -> BoolArray:
@@ -59,15 +59,14 @@ class Screen:
         suspect |= self._steps_at_an_edge(samples, peaks)
         suspect |= self._often_at_its_peak(samples, peaks)
         found: BoolArray = np.logical_or.reduce(suspect[..., 0], axis=1)
-        if self.linear.size and self.rotational.size:
-            found |= self._same_extremes(highest[..., 0], lowest[..., 0])
+        found |= self._same_extremes(highest, lowest)
         return found
 
     def _steps_at_an_edge(self, samples: FloatArray, peaks: FloatArray) -> BoolArray:
         """A first or last step of more than the share of the peak that a glitch has at least."""
-        least = QUALITY_LIMITS["edge"]["share_of_peak"] * peaks
-        steps = np.abs(samples[..., [0, -1]] - samples[..., [1, -2]])
-        found: BoolArray = np.logical_or.reduce(steps > least, axis=2, keepdims=True)
+        first = np.abs(samples[..., :1] - samples[..., 1:2])
+        last = np.abs(samples[..., -1:] - samples[..., -2:-1])
+        found: BoolArray = np.maximum(first, last) > QUALITY_LIMITS["edge"]["share_of_peak"] * peaks
         return found
 
     def _often_at_its_peak(self, samples: FloatArray, peaks: FloatArray) -> BoolArray:
@@ -78,8 +77,8 @@ class Screen:
         return found
 
     def _same_extremes(self, highest: FloatArray, lowest: FloatArray) -> BoolArray:
-        """A linear and a rotational channel with one largest and one smallest value."""
-        same = highest[:, self.linear, None] == highest[:, None, self.rotational]
-        same &= lowest[:, self.linear, None] == lowest[:, None, self.rotational]
+        """A linear and a rotational channel with one largest and one smallest value: m x channels x 1 of each."""
+        same = highest[:, self.linear] == highest[:, self.rotational].swapaxes(1, 2)
+        same &= lowest[:, self.linear] == lowest[:, self.rotational].swapaxes(1, 2)
         found: BoolArray = np.logical_or.reduce(same, axis=(1, 2))
         return found

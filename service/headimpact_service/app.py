@@ -76,6 +76,7 @@ def create_app(configured: Settings, database: Database, engine: deps.JobEngine 
         middleware=[Middleware(Edge, access_log=configured.access_log)],
         exception_handlers={Problem: _problem, HTTPException: _http_exception},
         lifespan=_lifespan,
+        telemetry={"tracing": False, "metrics": False, "logs": False},  # its logs tell what validation refused
     )
     app.router.redirect_slashes = False  # /v1/impacts/ is another path, and nothing is there
     deps.set_up(app, configured, database, engine)

@@ -30,6 +30,8 @@ class GuardedProtocol(HttpToolsProtocol):
     head_timeout_s: ClassVar[float] = 20.0
     rest_timeout_s: ClassVar[float] = 30.0
     guard: asyncio.TimerHandle | None = None
+    head_is_open = False
+    """A head has begun, and is not there as a whole."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override] # as uvicorn has it
         """A new connection owes a head."""
@@ -41,14 +43,20 @@ class GuardedProtocol(HttpToolsProtocol):
         self._met()
         super().connection_lost(exc)
 
-    def on_message_begin(self) -> None:
-        """The first byte of the next request on a connection that is kept: it owes the rest of its head."""
-        super().on_message_begin()
-        if self.guard is None:
+    def data_received(self, data: bytes) -> None:
+        """A head of which only a part has come: the rest is owed, also on a connection that is kept."""
+        super().data_received(data)
+        if self.head_is_open and self.guard is None:
             self._expect_within(self.head_timeout_s)
+
+    def on_message_begin(self) -> None:
+        """The first byte of a request."""
+        super().on_message_begin()
+        self.head_is_open = True
 
     def on_headers_complete(self) -> None:
         """The head is there."""
+        self.head_is_open = False
         self._met()
         super().on_headers_complete()
 
