@@ -8,23 +8,26 @@ from headimpact_service.intake.records import arrays, describe
 from headimpact_service.intake.rendering import new_score
 from headimpact_service.intake.scoring import Scored
 from headimpact_service.store import ids, traces
-from headimpact_service.store.impact_rows import NewImpact
+from headimpact_service.store.impact_rows import NewImpact, Seen
 
 _COLUMNS = ("session_id", "activity", "sport", "position")
 
 
-def new_impact(scored: Scored, sent_content_digest: bytes, key_id: bytes | None) -> NewImpact:
-    """What is stored of a record and its score."""
-    return new_impacts([(scored, sent_content_digest)], key_id)[0]
+def new_impact(scored: Scored, sent_content_digest: bytes, key_id: bytes | None, seen: Seen | None = None) -> NewImpact:
+    """What is stored of a record and its score, with what it was `seen` under."""
+    trace = traces.encode(arrays(scored.record.recording))
+    return _new(scored, sent_content_digest, key_id, trace, seen)
 
 
 def new_impacts(scored: Sequence[tuple[Scored, bytes]], key_id: bytes | None) -> list[NewImpact]:
     """The same of many, each with the digest of what was sent."""
     encoded = traces.encode_many([arrays(item.record.recording) for item, _ in scored])
-    return [_new(item, digest, key_id, trace) for (item, digest), trace in zip(scored, encoded, strict=True)]
+    return [_new(item, digest, key_id, trace, None) for (item, digest), trace in zip(scored, encoded, strict=True)]
 
 
-def _new(scored: Scored, sent_content_digest: bytes, key_id: bytes | None, trace: bytes) -> NewImpact:
+def _new(
+    scored: Scored, sent_content_digest: bytes, key_id: bytes | None, trace: bytes, seen: Seen | None
+) -> NewImpact:
     record = scored.record
     context = record.context
     rest = {name: value for name, value in context.items() if name not in _COLUMNS}
@@ -45,6 +48,7 @@ def _new(scored: Scored, sent_content_digest: bytes, key_id: bytes | None, trace
         position=context.get("position"),
         context=rest or None,
         key_id=key_id,
+        seen=seen,
     )
 
 

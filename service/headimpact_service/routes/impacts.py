@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -92,7 +91,7 @@ async def _stored(call: Call, change: Callable[[NewImpact, Any], Outcome]) -> tu
 async def _scored(call: Call, record: ImpactRecord) -> tuple[Scored, NewImpact]:
     """The record's score, and the rows of both."""
     scored, seen = await score(call, record)
-    return scored, replace(new_impact(scored, content_digest(record, scored.sent_digest), call.key.id), seen=seen)
+    return scored, new_impact(scored, content_digest(record, scored.sent_digest), call.key.id, seen)
 
 
 def _answer(call: Call, impact: Impact, status: int, scored: Scored, *, redelivered: bool = False) -> Response:
