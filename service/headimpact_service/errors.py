@@ -133,8 +133,9 @@ PROBLEMS: Mapping[str, ProblemType] = MappingProxyType(
         "impact-deleted": ProblemType(
             409,
             "This impact was deleted",
-            "The impact with this `external_id` was deleted; sending it again does not bring it back.",
-            "Give the record another `external_id` if it is meant to be a new impact.",
+            "The impact with this `external_id`, or of an import one with all of this content, was deleted; sending it "
+            "again does not bring it back.",
+            "If it is meant to be a new impact, send it to `POST /v1/impacts`, under another `external_id` or none.",
         ),
         "idempotency-conflict": ProblemType(
             409,

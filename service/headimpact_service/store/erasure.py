@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Connection, bindparam, delete, select, update
+from typing import Any
+
+from sqlalchemy import BindParameter, Connection, bindparam, delete, select, update
 
 from headimpact_service.store import jobs
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
+from headimpact_service.store.impact_rows import deleted_content
+from headimpact_service.store.many import in_parts
 from headimpact_service.store.tables import impact_revisions, impacts, labels, scores
 
 _NOTHING = {
@@ -16,6 +20,10 @@ _NOTHING = {
 }
 _ENTOMB = update(impacts).where(
     impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact_id")
+)
+_IDS: BindParameter[Any] = bindparam("impact_ids", expanding=True)
+_DELIVERED = select(impact_revisions.c.impact_id, impact_revisions.c.content_digest).where(
+    impact_revisions.c.impact_id.in_(_IDS), impact_revisions.c.revision == 1
 )
 _CONTENTS = [
     delete(table).where(table.c.impact_id == bindparam("impact")) for table in (labels, scores, impact_revisions)
@@ -36,10 +44,12 @@ def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes],
     """Delete the traces, scores, labels and revisions of impacts and all they say; with `external_ids` their names too.
 
     The athlete's id stays, so that whoever follows one athlete's list sees the tombstone, and so does the digest of
-    the external id, so that a redelivery does not bring the impact back.
+    the external id, so that a redelivery does not bring the impact back; where the names stay, also one of what was
+    delivered.
     """
     if not impact_ids:
         return
+    delivered = {} if external_ids else _delivered(conn, data_set_id, impact_ids)
     for statement in _CONTENTS:
         conn.execute(statement, [{"impact": impact_id} for impact_id in impact_ids])
     first = next_change(conn, impacts, data_set_id)
@@ -48,9 +58,20 @@ def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes],
     for number, impact_id in enumerate(impact_ids):
         now = first + number * MICROSECOND
         tombs.append(
-            nothing | {"of_data_set": data_set_id, "impact_id": impact_id, "updated_at": now, "deleted_at": now}
+            nothing
+            | {"of_data_set": data_set_id, "impact_id": impact_id, "updated_at": now, "deleted_at": now}
+            | {"deleted_content": delivered.get(impact_id)}
         )
     conn.execute(_ENTOMB.values(revision=impacts.c.revision + 1), tombs)
+
+
+def _delivered(conn: Connection, data_set_id: bytes, impact_ids: list[bytes]) -> dict[bytes, bytes]:
+    """What each tombstone keeps of the impact as it was delivered first."""
+    found: dict[bytes, bytes] = {}
+    for part in in_parts(impact_ids):
+        for impact_id, content_digest in conn.execute(_DELIVERED, {"impact_ids": part}):
+            found[impact_id] = deleted_content(data_set_id, content_digest)
+    return found
 
 
 def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> None:
@@ -64,8 +85,10 @@ def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: byt
     mine = select(impacts.c.id).where(impacts.c.athlete_id == athlete_id)
     known = conn.execute(mine.where(impacts.c.deleted_at.is_(None))).scalars().all()
     erase_impacts(conn, data_set_id, list(known), external_ids=True)
-    # Those deleted one by one before kept their external ids.
-    conn.execute(update(impacts).where(impacts.c.athlete_id == athlete_id).values(external_id=None))
+    # Those deleted one by one before kept their external ids, and what they were known by.
+    conn.execute(
+        update(impacts).where(impacts.c.athlete_id == athlete_id).values(external_id=None, deleted_content=None)
+    )
     moved = conn.execute(_MOVED, {"athlete_id": athlete_id}).all()
     if moved:
         for statement in _REVISION:

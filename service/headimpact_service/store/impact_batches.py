@@ -20,7 +20,7 @@ from headimpact_service.store import impacts as impact_store
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.impact_inserts import first_row, insert_rows
-from headimpact_service.store.impact_rows import NewImpact, external_id_digest
+from headimpact_service.store.impact_rows import NewImpact, deleted_content, external_id_digest
 from headimpact_service.store.many import ASKED_AT_ONCE, in_parts
 from headimpact_service.store.tables import athletes, devices, impacts
 
@@ -38,9 +38,9 @@ class Added:
 
 _DATA_SET_PARAMETER: BindParameter[bytes] = bindparam("data_set_id")
 _ASKED: BindParameter[Any] = bindparam("asked", expanding=True)
-_NAMES, _CONTENTS = (
+_NAMES, _CONTENTS, _DELETED = (
     select(digest).where(impacts.c.data_set_id == _DATA_SET_PARAMETER, digest.in_(_ASKED)).limit(bindparam("most"))
-    for digest in (impacts.c.external_id_digest, impacts.c.input_digest)
+    for digest in (impacts.c.external_id_digest, impacts.c.input_digest, impacts.c.deleted_content)
 )
 _ATHLETES = select(athletes.c.external_id, func.coalesce(athletes.c.merged_into, athletes.c.id)).where(
     athletes.c.data_set_id == _DATA_SET_PARAMETER, athletes.c.external_id.in_(_ASKED)
@@ -68,7 +68,7 @@ def _add(conn: Connection, data_set_id: bytes, new: NewImpact) -> Added | Proble
 
 
 def _perhaps_known(conn: Connection, data_set_id: bytes, news: Sequence[NewImpact]) -> set[int]:
-    """The places of those that share a name or a content with what is stored, or with another of them.
+    """The places of those that share a name or a content with what is or was stored, or with another of them.
 
     An athlete that is given by our id may be none of ours, which is for one impact to say.
     """
@@ -76,10 +76,15 @@ def _perhaps_known(conn: Connection, data_set_id: bytes, news: Sequence[NewImpac
     contents = [new.input_digest for new in news]
     known_names = _known(conn, data_set_id, _NAMES, names)
     known_contents = _known(conn, data_set_id, _CONTENTS, contents)
+    deliveries = [deleted_content(data_set_id, new.content_digest) for new in news]
+    deleted = _known(conn, data_set_id, _DELETED, deliveries)
     return {
         index
         for index, new in enumerate(news)
-        if new.athlete_id is not None or names[index] in known_names or contents[index] in known_contents
+        if new.athlete_id is not None
+        or names[index] in known_names
+        or contents[index] in known_contents
+        or deliveries[index] in deleted
     }
 
 

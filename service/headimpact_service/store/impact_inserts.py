@@ -38,6 +38,7 @@ def first_row(
         "created_at": now,
         "updated_at": now,
         "deleted_at": None,
+        "deleted_content": None,
     }
 
 

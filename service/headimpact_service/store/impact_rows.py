@@ -174,3 +174,8 @@ def external_id_digest(data_set_id: bytes, external_id: str | None) -> bytes | N
     if external_id is None:
         return None
     return blake2b(external_id.encode(), key=data_set_id, digest_size=16).digest()
+
+
+def deleted_content(data_set_id: bytes, content_digest: bytes) -> bytes:
+    """What a tombstone keeps of its content: who has the content can tell that it was there, and nobody else."""
+    return blake2b(content_digest, key=data_set_id, digest_size=16).digest()

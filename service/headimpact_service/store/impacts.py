@@ -28,7 +28,15 @@ from headimpact_service.store.impact_lists import (
     trace,
     traced,
 )
-from headimpact_service.store.impact_rows import Impact, NewImpact, Outcome, Revision, ScoreOutdated, external_id_digest
+from headimpact_service.store.impact_rows import (
+    Impact,
+    NewImpact,
+    Outcome,
+    Revision,
+    ScoreOutdated,
+    deleted_content,
+    external_id_digest,
+)
 from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.revision import require_revision
 from headimpact_service.store.score_rows import stored
@@ -65,7 +73,12 @@ _SAME_EVENT = Prepared(
     )
     .limit(1)
 )
-_INTERNAL = frozenset({"data_set_id", "external_id_digest", "score_number"})
+_DELETED = Prepared(
+    select(impacts.c.id)
+    .where(impacts.c.data_set_id == _DATA_SET, impacts.c.deleted_content == bindparam("deleted_content"))
+    .limit(1)
+)
+_INTERNAL = frozenset({"data_set_id", "external_id_digest", "score_number", "deleted_content"})
 _UPDATE = update(impacts).where(impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact"))
 _SUPERSEDE = update(impact_revisions).where(
     impact_revisions.c.impact_id == bindparam("impact"), impact_revisions.c.revision == bindparam("before")
@@ -79,7 +92,7 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
     `external-id-conflict` problem, and `impact-deleted` after a deletion. An athlete id that is none of the data set's
     is a `not-found` problem, and a score that was made under what has changed since is :class:`ScoreOutdated`. With
     `same_event_is_unchanged` (imports), an impact of the same athlete, instant and input is `unchanged` too, under
-    whatever name that is not taken.
+    whatever name that is not taken, and what was deleted does not come back.
     """
     known = look_up(conn, data_set_id, new)
     if known.same_external_id is not None:
@@ -88,6 +101,8 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
         same = _same_event(conn, data_set_id, new, known)
         if same is not None:
             return Outcome("unchanged", same)
+    if same_event_is_unchanged and _was_deleted(conn, data_set_id, new):
+        raise Problem("impact-deleted", "This impact was deleted; to store it again, send it to POST /v1/impacts.")
     _require_present(new, known)
     return Outcome("created", _insert(conn, data_set_id, new, known))
 
@@ -111,6 +126,12 @@ def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: Kno
     }
     found = _SAME_EVENT.first(conn, parameters)
     return None if found is None else get(conn, data_set_id, found[0])
+
+
+def _was_deleted(conn: Connection, data_set_id: bytes, new: NewImpact) -> bool:
+    """Whether an impact that was delivered just so was deleted."""
+    digest = deleted_content(data_set_id, new.content_digest)
+    return _DELETED.first(conn, {"data_set_id": data_set_id, "deleted_content": digest}) is not None
 
 
 def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known, impact_id: bytes) -> Outcome:

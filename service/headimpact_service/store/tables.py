@@ -171,11 +171,20 @@ impacts = Table(
     Column("created_at", Instant, nullable=False),
     Column("updated_at", Instant, nullable=False),
     Column("deleted_at", Instant),
+    # Of a tombstone, a digest of what was delivered: a file that brings the same again does not bring it back.
+    Column("deleted_content", LargeBinary(16)),
     UniqueConstraint("data_set_id", "external_id_digest"),
     Index(None, "data_set_id", "updated_at", "id"),
     Index(None, "data_set_id", "input_digest", "id"),
     Index(None, "athlete_id", "occurred_at", "id"),
     sqlite_with_rowid=False,
+)
+Index(
+    "ix_impacts_data_set_id_deleted_content",
+    impacts.c.data_set_id,
+    impacts.c.deleted_content,
+    sqlite_where=impacts.c.deleted_content.is_not(None),
+    postgresql_where=impacts.c.deleted_content.is_not(None),
 )
 
 impact_revisions = Table(

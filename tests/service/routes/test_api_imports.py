@@ -45,6 +45,24 @@ class TestImport:
             assert answer.json()["data"][0]["status"] == status
         assert len(api.get("/v1/impacts").json()["data"]) == 1
 
+    def test_what_was_deleted_does_not_come_back_with_its_file(self, api: Api) -> None:
+        fields = FIELDS | {"mapping": json.dumps(MAPPING)}
+        created = upload(api, table(), **fields).json()["data"][0]["id"]
+        assert api.delete(f"/v1/impacts/{created}").status_code == 204
+        row = upload(api, table(), **fields).json()["data"][0]
+        assert (row["status"], row["problem"]["type"]) == ("failed", "/problems/impact-deleted")
+        assert api.get("/v1/impacts").json()["data"] == []
+        other = upload(api, table(), **fields | {"occurred_at": "2026-11-21T19:04:05Z"}).json()
+        assert other["summary"] == {"created": 1, "unchanged": 0, "failed": 0}
+
+    def test_a_deleted_impact_is_stored_again_where_it_is_sent_by_itself(self, api: Api) -> None:
+        sent = {name: value for name, value in impact_body().items() if name != "external_id"}
+        api.delete(f"/v1/impacts/{api.post('/v1/impacts', json=sent).json()['id']}")
+        assert upload(api, json.dumps(sent).encode(), "application/json").json()["summary"]["failed"] == 1
+        assert api.post("/v1/impacts", json=sent).status_code == 201
+        # now it is there, so the file is what was delivered before
+        assert upload(api, json.dumps(sent).encode(), "application/json").json()["summary"]["unchanged"] == 1
+
     def test_json_and_ndjson_files_hold_many_impacts(self, api: Api) -> None:
         bodies = [impact_body(f"e-{i}", scale=1 + i / 10) for i in range(3)]
         listed = upload(api, json.dumps(bodies).encode(), "application/json").json()

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 import pytest
+from sqlalchemy import func, select
 
 from headimpact_service.errors import Problem
 from headimpact_service.store import athletes, devices, ids, impacts, scores
@@ -13,6 +14,7 @@ from headimpact_service.store.athletes import AthleteFields
 from headimpact_service.store.database import Database
 from headimpact_service.store.devices import DeviceFields
 from headimpact_service.store.impacts import Impact, ImpactFilters, NewImpact, Outcome
+from headimpact_service.store.tables import impacts as impact_table
 
 
 def add(database: Database, data_set: bytes, new: NewImpact, **options: bool) -> Outcome:
@@ -63,6 +65,16 @@ class TestErase:
         database.write(lambda conn: athletes.erase(conn, data_set, mine.athlete_id))
         with database.read() as conn:
             assert impacts.get_any(conn, data_set, mine.id).external_id is None
+
+    def test_nothing_stays_by_which_an_erased_athletes_content_is_known(self, database, data_set, make_impact) -> None:
+        before, later = (add(database, data_set, make_impact(word, external_id=word)).impact for word in "ab")
+        database.write(lambda conn: impacts.delete(conn, data_set, before.id))
+        kept = select(func.count()).select_from(impact_table).where(impact_table.c.deleted_content.is_not(None))
+        with database.read() as conn:
+            assert conn.execute(kept).scalar() == 1
+        database.write(lambda conn: athletes.erase(conn, data_set, later.athlete_id))
+        with database.read() as conn:
+            assert conn.execute(kept).scalar() == 0
 
     def test_revisions_that_were_corrected_to_another_athlete_go_too(self, database, data_set, make_impact) -> None:
         first = add(database, data_set, make_impact()).impact

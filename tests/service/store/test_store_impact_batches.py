@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -97,7 +98,7 @@ def test_together_and_one_by_one_are_the_same(database: Database, make_impact: M
         data_sets.append(database.write(prepare))
     generator = np.random.default_rng(seed)
     for turn in range(4):
-        news = some(make_impact, generator, 15)
+        news = [*some(make_impact, generator, 15), make_impact(f"gone {turn}", external_id=None)]
         together = database.write(lambda conn, news=news: add_many(conn, data_sets[0], news))
         alone = database.write(lambda conn, news=news: one_by_one(conn, data_sets[1], news))
         assert told(together) == told(alone)
@@ -107,7 +108,14 @@ def test_together_and_one_by_one_are_the_same(database: Database, make_impact: M
                 with database.read() as conn:
                     rows = impacts.page(conn, data_set).rows
                 named = sorted((row for row in rows if row.external_id), key=lambda row: row.external_id or "")
-                database.write(lambda conn, d=data_set, i=named[0].id: impacts.delete(conn, d, i))
+                unnamed = [row for row in rows if not row.external_id]
+                for gone in (*named[:1], *unnamed):
+                    database.write(lambda conn, d=data_set, i=gone.id: impacts.delete(conn, d, i))
+            news = [replace(new, external_id=None) for new in news]
+            together = database.write(lambda conn, news=news: add_many(conn, data_sets[0], news))
+            alone = database.write(lambda conn, news=news: one_by_one(conn, data_sets[1], news))
+            assert told(together) == told(alone)
+            assert any(isinstance(item, Problem) and item.slug == "impact-deleted" for item in together)
 
 
 def test_what_is_stored_together_changes_at_instants_of_its_own(

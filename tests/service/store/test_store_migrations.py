@@ -40,7 +40,7 @@ def test_the_version_is_committed(empty_url: str) -> None:
     database = Database(empty_url)
     database.migrate()
     database.close()
-    assert rows(empty_url, "SELECT version_num FROM alembic_version") == [("0003",)]
+    assert rows(empty_url, "SELECT version_num FROM alembic_version") == [("0004",)]
 
 
 def test_migrating_twice_changes_nothing(database: Database) -> None:
