@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
+from operator import itemgetter
 
 import numpy as np
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import Stacked, said
 from headimpact_service.ingest.file_faults import file_fault
+from headimpact_service.ingest.steady import changed_rows
 from headimpact_service.ingest.table import Columns
 
 WINDOW_ROWS = 65_536
@@ -134,13 +136,14 @@ class _Parting:
 
     def _runs(self, columns: Columns) -> list[tuple[tuple[str, ...], slice]]:
         """Rows of one key that follow each other."""
+        changed = changed_rows(columns.texts, self._keys, columns.rows)
+        changed[:1] = True
+        starts = np.flatnonzero(changed).tolist()
+        keys = [tuple(said(columns.texts[index][row]) for index in self._keys) for row in starts]
         runs: list[tuple[tuple[str, ...], slice]] = []
-        start = 0
-        cells = (map(said, columns.texts[index]) for index in self._keys)
-        for key, run in groupby(zip(*cells, strict=True)):
-            stop = start + sum(1 for _ in run)
-            runs.append((key, slice(start, stop)))
-            start = stop
+        for key, pieces in groupby(zip(keys, starts, [*starts[1:], columns.rows], strict=True), itemgetter(0)):
+            (_, start, stop), *further = pieces
+            runs.append((key, slice(start, further[-1][2] if further else stop)))
         return runs if all(any(key) for key, _ in runs) else _without_empty(columns, runs)
 
     def _window(self, columns: Columns, runs: list[tuple[tuple[str, ...], slice]], first: int) -> Window:
