@@ -4,7 +4,8 @@
 
 Both are separate processes on loopback; what is counted is the server process's user and system time, the writer
 thread and SQLite included. Complete requests on keep-alive connections: key, checks, filter, score, answer. Measured
-with one sender, where every commit is its own, and with eight at once, where those that wait share one.
+with one sender, where every commit is its own, and with eight and thirty-two at once, where those that arrive together
+are scored together and share one.
 """
 
 from __future__ import annotations
@@ -166,5 +167,5 @@ def report(costs: dict[str, list[float]], senders: int) -> None:
 
 
 if __name__ == "__main__":
-    for count in (1, 8):
+    for count in (1, 8, 32):
         measure(count)
