@@ -36,7 +36,7 @@ def without(headings: Headings, columns: Collection[int]) -> Headings:
         return headings
     written = ["" if column in columns else heading for column, heading in enumerate(headings.written)]
     units = {column: unit for column, unit in headings.units.items() if column not in columns}
-    return Headings(written, units, headings.dated)
+    return Headings(written, units, headings.dated, headings.lone)
 
 
 def unclear_axis(column: str, signal: SignalName) -> Problem:

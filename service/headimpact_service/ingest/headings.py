@@ -20,15 +20,21 @@ class Headings:
     """The headings of one table, to be looked up by any of a column's spellings."""
 
     def __init__(
-        self, headings: Sequence[str], units: Mapping[int, str] | None = None, dated: Collection[int] = ()
+        self,
+        headings: Sequence[str],
+        units: Mapping[int, str] | None = None,
+        dated: Collection[int] = (),
+        lone: Collection[int] = (),
     ) -> None:
         """Index the headings as written and as :func:`compact` has them.
 
-        `units` stand beside them in the file; columns that are `dated` need none.
+        `units` stand beside them in the file; columns that are `dated` need none; those that are `lone` hold one value
+        an impact, as an array file's facts do, and no times of samples.
         """
         self.written = tuple(heading.strip() for heading in headings)
         self.units = units or {}
         self.dated = dated
+        self.lone = lone
         self._exact = _places(self.written)
         self._compact = _places([compact(heading) for heading in self.written])
         self._again = _repeated(self._exact)
@@ -214,6 +220,8 @@ class Vocabulary:
         """The columns of times that name one signal's sensor, as a time of the gyroscope."""
         found: dict[SignalName, list[mappings.TimeColumn]] = {}
         for column, heading in enumerate(headings.written):
+            if column in headings.lone:
+                continue
             signal = sensor_of_times(heading) if may_be_times(heading) else None
             dates = mappings.DATES_IN if column in headings.dated else None
             unit = dates or unit_of_times(heading, headings.units.get(column))
@@ -231,7 +239,12 @@ class Vocabulary:
         found: list[tuple[tuple[bool, int], mappings.TimeColumn]] = []
         for place, (heading, said) in enumerate(zip(headings.written, headings.spoken, strict=True)):
             meaning, dated = self.understand(said), place in headings.dated
-            if meaning is not None and meaning.signal is None and (dated or meaning.unit is not None):
+            if (
+                place not in headings.lone
+                and meaning is not None
+                and meaning.signal is None
+                and (dated or meaning.unit is not None)
+            ):
                 column = mappings.TimeColumn.model_validate(
                     {"column": heading, "unit": meaning.unit or mappings.DATES_IN}
                 )

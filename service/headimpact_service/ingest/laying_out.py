@@ -157,7 +157,8 @@ def _clocks(mapping: Mapping, headings: Headings, required: bool, *, own: bool) 
     """The columns of stamps that the signals share, the one that is read first; none where each has its own."""
     if own:
         return []
-    found = [(column, time.unit) for time in mapping.time or () if (column := headings.find([time.column])) is not None]
+    named = [(column, time.unit) for time in mapping.time or () if (column := headings.find([time.column])) is not None]
+    found = [(column, unit) for column, unit in named if required or column not in headings.lone]
     if required and not found:
         raise _missing("The column of the time was not found.", "/time")
     return [_clock_in(column, unit, headings) for column, unit in dict(found).items()]

@@ -42,7 +42,8 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     Problem
         The table as a whole cannot be read. A fault of one impact is yielded in its place instead.
     """
-    headings = Headings(table.headings, table.units, table.dated)
+    lone = {place for place in range(len(table.headings)) if not table.has_samples(place)}
+    headings = Headings(table.headings, table.units, table.dated, lone)
     plan = _plan(headings, options, format_name)
     _require_sensor(plan.mapping)
     layout = _laid_out(plan, headings)

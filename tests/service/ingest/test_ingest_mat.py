@@ -252,6 +252,7 @@ class TestRates:
             {"tvec": T_2KHZ},
             {"sampling_interval_us": 500.0},
             {"dt": np.full((3, 1), 0.0005)},
+            {"Ts": 0.0005},
         ],
     )
     def test_one_that_is_not_read_is_not_passed_over(self, beside: dict[str, Any]):
@@ -259,6 +260,17 @@ class TestRates:
         assert codes(problem) == [("sample_rate_hz", "rate-missing" if "t" in beside else "rate-unclear")]
         found = records(mat({"impacts": noise(3, 100)} | beside), preset=PRESET, sample_rate_hz=2000.0)
         assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {2000.0}
+
+    @pytest.mark.parametrize("struct", [False, True])
+    def test_a_lone_number_is_no_column_of_times(self, struct: bool):
+        values = noise(1, 100)[0]
+        fields = {"acc": values[:, :3], "Ts": 0.0005}
+        data = mat({"impact": structs(fields)} if struct else fields)
+        unit = {"linear_acceleration": {"unit": "g"} | {axis: f"acc_{axis}" for axis in "xyz"}}
+        mapping = Mapping.model_validate(unit)
+        assert codes(refused(data, mapping=mapping)) == [("sample_rate_hz", "rate-missing")]
+        (record,) = records(data, mapping=mapping, sample_rate_hz=2000.0)
+        assert record.recording.linear_acceleration.sample_rate_hz == 2000.0
 
     @pytest.mark.parametrize(
         "beside",
