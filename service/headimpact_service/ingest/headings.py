@@ -190,14 +190,14 @@ class Vocabulary:
             before, _, behind = name.rpartition(unit)
             yield self._telling[unit], before + "|" + behind
 
-    def mapping(self, headings: Headings) -> mappings.Mapping:
-        """The mapping that a table's headings, each with the unit beside it, amount to."""
+    def mapping(self, headings: Headings, but: Collection[SignalName] = ()) -> mappings.Mapping:
+        """The mapping that a table's headings, each with the unit beside it, amount to, without some signals."""
         understood = zip(headings.written, self.meanings(headings), strict=True)
         found = [(heading, meaning) for heading, meaning in understood if meaning is not None]
         fields: dict[str, Any] = {}
         for signal in SIGNALS:
             columns = {heading: m for heading, m in found if m.signal == signal}
-            if columns:
+            if columns and signal not in but:
                 fields[signal] = _signal_columns(signal, columns)
         for signal, times in self.own_times(headings).items():
             if signal in fields:
@@ -289,7 +289,8 @@ def _signal_columns(signal: SignalName, columns: Mapping[str, Meaning]) -> dict[
         by_axis.setdefault(str(meaning.axis), []).append(heading)
     if any(len(headings) > 1 for headings in by_axis.values()):
         raise layout_problem(
-            f"Several columns could be the same component of the {signal}: say in a mapping which to take.",
+            f"Several columns could be the same component of the {signal}: say in a mapping which to take, with their "
+            "unit, and name there the columns of the other signals too.",
             code="heading-twice",
             pointer=f"/{signal}",
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from headimpact.quality import QualityNote
 from headimpact.recording import AXES, SignalName
 from headimpact_service.ingest.date_order import DateOrder
 from headimpact_service.ingest.other_times import NO_OTHERS, OtherTimes
@@ -82,6 +83,8 @@ class Layout:
     """What may say other times than those that are read."""
     unread: Unread = NOTHING_UNREAD
     """What may tell that the rows are several impacts, where nothing that is read would."""
+    notes: tuple[QualityNote, ...] = ()
+    """Of columns that seem to be a signal and are not read."""
 
     @property
     def clocks(self) -> list[Clock]:

@@ -56,7 +56,7 @@ class TableImpact:
         alike = samples.are_alike(self.rows)
         self.labels = RowLabels(self.layout, samples.texts, self.rows, self.cell, self.row, alike)
         self.times = ImpactTimes(plan, samples, self.rows, self.row)
-        self.notes: list[QualityNote] = []
+        self.notes: list[QualityNote] = list(samples.layout.notes)
 
     def record(self) -> ImpactRecord:
         """The impact, with what the sender gave beside the file in place of what the file says."""

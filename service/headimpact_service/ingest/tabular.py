@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from dataclasses import replace
 
-from headimpact.quality import words
+from headimpact.quality import QualityNote, words
+from headimpact.recording import SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.beside import with_axis_peaks, with_other_times, with_supplied, with_unread
 from headimpact_service.ingest.file_faults import file_fault
@@ -14,7 +17,7 @@ from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.laying_out import lay_out
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.mapping import Mapping, merge
-from headimpact_service.ingest.no_signal import is_no_signal, with_remedies
+from headimpact_service.ingest.no_signal import MAX_SHOWN, is_no_signal, with_remedies
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.presets import (
@@ -28,6 +31,7 @@ from headimpact_service.ingest.presets import (
 )
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
+from headimpact_service.ingest.seeming import seeming_signals
 from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.table_impact import TableImpact
 from headimpact_service.ingest.time_headings import speaks_of_times
@@ -47,7 +51,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     plan = _plan(headings, options, format_name)
     _require_sensor(plan.mapping)
     layout = _laid_out(plan, headings)
-    _require_read(layout, headings, options)
+    layout = _require_read(layout, headings, options, table)
     _require_no_other_device(layout, plan, headings)
     _require_rate(layout, plan)
     _require_no_other_rate(layout, plan, headings)
@@ -102,7 +106,7 @@ def _plan(headings: Headings, options: ImportOptions, format_name: str) -> Plan:
         mapping = _without_overridden(merge(beside_signals(headings), asked), options)
         return Plan(mapping, None, required, options, format_name)
     named = named_facts(options.filename, preset.file_name, options.time_zone)
-    mapping = _without_overridden(merge(preset.mapping_for(headings), asked), options)
+    mapping = _without_overridden(merge(preset.mapping_for(headings, _named_signals(asked)), asked), options)
     return Plan(mapping, preset.name, required, options, format_name, named)
 
 
@@ -130,6 +134,14 @@ def _names_signals(mapping: Mapping) -> bool:
     return any(s is not None and (s.x or s.y or s.z) for s in signals)
 
 
+def _named_signals(mapping: Mapping | None) -> frozenset[SignalName]:
+    """The signals of which a mapping says every axis and the unit, or that they are none: no heading need tell them."""
+    if mapping is None:
+        return frozenset()
+    sent = {name: mapping.columns_of(name) for name in SIGNALS if name in mapping.model_fields_set}
+    return frozenset(name for name, s in sent.items() if s is None or (s.unit and s.x and s.y and s.z))
+
+
 def _laid_out(plan: Plan, headings: Headings) -> Layout:
     """The layout, or why there is none, with the preset whose columns these are unless one was named."""
     try:
@@ -154,18 +166,46 @@ def _require_sensor(mapping: Mapping) -> None:
         )
 
 
-def _require_read(layout: Layout, headings: Headings, options: ImportOptions) -> None:
-    """Refuse columns that seem to be a signal and would not be read, unless a mapping says which are."""
-    if options.mapping is not None and _names_signals(options.mapping):
-        return
-    for signal, columns in spoken_of(headings).items():
-        if signal not in layout.signals:
+def _require_read(layout: Layout, headings: Headings, options: ImportOptions, table: Table) -> Layout:
+    """Refuse columns that seem to be a signal and would not be read; where a mapping says which are, note them."""
+    read = set(layout.numbers)
+    seeming = {
+        signal: columns
+        for signal, columns in spoken_of(headings).items()
+        if read.isdisjoint(headings.find([column]) for column in columns)
+    }
+    found = seeming_signals(headings, table, read) | seeming
+    left = {signal: columns for signal, columns in found.items() if signal not in layout.signals}
+    if options.mapping is None or not _names_signals(options.mapping):
+        for signal, columns in left.items():
             raise layout_problem(
-                f"The columns {', '.join(columns)} seem to be the {words(signal)}, in a unit or for a device that is "
-                "not known: name the columns of every signal, and their units, in a mapping.",
+                f"The columns {', '.join(columns[:MAX_SHOWN])} seem to be the {words(signal)}, on axes, in a unit or "
+                "for a device that is not known: name the columns of every signal, and their units, in a mapping.",
                 code="columns-not-read",
                 pointer=f"/{signal}",
             )
+        return layout
+    notes = tuple(
+        QualityNote(
+            "channel_missing",
+            "warning",
+            f"The columns {', '.join(columns[:MAX_SHOWN])} seem to be the {words(signal)}, of which the mapping names "
+            f"none: they were not read. Name them in it too, or say {json.dumps({signal: None})}.",
+            signal,
+        )
+        for signal, columns in left.items()
+        if not _is_null(options.mapping, signal) and not (signal == "angular_acceleration" and _turns(layout))
+    )
+    return replace(layout, notes=notes)
+
+
+def _turns(layout: Layout) -> bool:
+    """Whether the angular velocity is read, of which the acceleration is the derivative."""
+    return "angular_velocity" in layout.signals
+
+
+def _is_null(mapping: Mapping, name: SignalName) -> bool:
+    return name in mapping.model_fields_set and getattr(mapping, name) is None
 
 
 def _require_no_other_device(layout: Layout, plan: Plan, headings: Headings) -> None:

@@ -409,6 +409,56 @@ def test_columns_that_seem_to_be_a_signal_are_never_passed_over(columns):
     assert record.recording.angular_velocity is None
 
 
+@pytest.mark.parametrize(
+    ("columns", "signal"),
+    [
+        ("Acceleration AP (g),Acceleration ML (g),Acceleration SI (g)", "linear_acceleration"),
+        ("a1 (g),a2 (g),a3 (g)", "linear_acceleration"),
+        ("Head AX,Head AY,Head AZ", "linear_acceleration"),
+        ("11HEADCG00H3ACXA,11HEADCG00H3ACYA,11HEADCG00H3ACZA", "linear_acceleration"),
+        ("Gyro 1,Gyro 2,Gyro 3", "angular_velocity"),
+        ("p (deg/s),q (deg/s),r (deg/s)", "angular_velocity"),
+    ],
+)
+def test_a_signal_whose_axes_are_called_otherwise_is_never_passed_over(columns: str, signal: str):
+    is_linear = signal == "linear_acceleration"
+    other = "wx_rad_s,wy_rad_s,wz_rad_s" if is_linear else "ax_g,ay_g,az_g"
+    problem = refused(table(f"t_ms,{other},{columns}"))
+    assert codes(problem) == [(f"/{signal}", "columns-not-read")]
+    unit = {"unit": "g" if is_linear else "deg/s"} | dict(zip("xyz", columns.split(","), strict=True))
+    other_unit = {"unit": "rad/s" if is_linear else "g"} | dict(zip("xyz", other.split(","), strict=True))
+    both = {signal: unit, "angular_velocity" if is_linear else "linear_acceleration": other_unit}
+    assert one(table(f"t_ms,{other},{columns}"), mapping=mapping(both)).notes == ()
+
+
+@pytest.mark.parametrize(
+    "extra", ["PLA (g),PLA time,Threshold (g),Range (g)", "Mag X,Mag Y,Mag Z", "Peak Acc 1,Peak Acc 2,Peak Acc 3"]
+)
+def test_what_is_no_signal_is_passed_over(extra: str):
+    assert one(table("t_ms,wx_rad_s,wy_rad_s,wz_rad_s," + extra)).recording.linear_acceleration is None
+
+
+def test_a_signal_that_a_mapping_does_not_name_is_noted():
+    text = table("t_ms,ax_g,ay_g,az_g,wx_rad_s,wy_rad_s,wz_rad_s")
+    only = {"linear_acceleration": {"unit": "g", "x": "ax_g", "y": "-ay_g", "z": "az_g"}}
+    record = one(text, mapping=mapping(only))
+    assert record.recording.angular_velocity is None
+    (note,) = record.notes
+    assert (note.code, note.severity, note.signal) == ("channel_missing", "warning", "angular_velocity")
+    assert "wx_rad_s" in note.detail
+    assert one(text, mapping=mapping(only | {"angular_velocity": None})).notes == ()
+
+
+def test_beside_a_preset_a_mapping_settles_which_columns_are_meant():
+    text = table("t_ms,Ax (m/s^2),Ay (m/s^2),Az (m/s^2),ax_g,ay_g,az_g,wx_rad_s,wy_rad_s,wz_rad_s")
+    problem = refused(text)
+    assert codes(problem) == [("/linear_acceleration", "heading-twice")]
+    which = mapping({"linear_acceleration": {"unit": "g", "x": "ax_g", "y": "ay_g", "z": "az_g"}})
+    record = one(text, mapping=which, preset="generic_six_axis")
+    assert record.recording.linear_acceleration.unit == "g"
+    assert record.recording.angular_velocity is not None
+
+
 def test_a_devices_signal_in_another_unit_is_not_passed_over_by_its_preset():
     heading = "t.ms,PAV.X.radsec,PAV.Y.radsec,PAV.Z.radsec,PLA.X.g,PLA.Y.g,PLA.Z.g"
     assert codes(refused(table(heading), preset="prevent")) == [("/linear_acceleration", "columns-not-read")]

@@ -176,7 +176,8 @@ def test_each_impact_has_its_own_peak() -> None:
 
 def test_a_mapping_names_peaks_and_resultants() -> None:
     columns = {"unit": "g", "x": "ax_g", "y": "ay_g", "z": "az_g", "peak": "P", "resultant": "R (m/s^2)"}
-    mapping = Mapping.model_validate({"linear_acceleration": columns, "time": {"column": "t_s", "unit": "s"}})
+    time = {"column": "t_s", "unit": "s"}
+    mapping = Mapping.model_validate({"linear_acceleration": columns, "angular_velocity": None, "time": time})
     table = np.column_stack([six_axis(), LINEAR * GRAVITY, np.full(40, LINEAR.max())])
     assert mismatches(one(csv_text(table, heading=f"{GENERIC},R (m/s^2),P"), mapping=mapping)) == []
     table[:, 7] = 77.0

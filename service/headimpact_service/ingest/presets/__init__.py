@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Annotated, Any, Literal
@@ -40,12 +40,15 @@ class Preset(Strict):
     mapping: Mapping
     vocabulary: dict[str, Any] | None = None
 
-    def mapping_for(self, headings: Headings) -> Mapping:
-        """The preset's mapping, completed by what the headings say: all that its vocabulary reads, or units only."""
+    def mapping_for(self, headings: Headings, but: Collection[SignalName] = ()) -> Mapping:
+        """The preset's mapping, completed by what the headings say: all that its vocabulary reads, or units only.
+
+        Signals that are named elsewhere are of no account in headings (`but`).
+        """
         if self.vocabulary is None:
             own = _with_units(self.mapping, headings) if "units" in self.requires else self.mapping
             return _with_names(own, headings)
-        spoken = _vocabulary(self.name).mapping(without(headings, self.axis_peaks(headings)))
+        spoken = _vocabulary(self.name).mapping(without(headings, self.axis_peaks(headings)), but)
         return spoken.model_copy(update={name: getattr(self.mapping, name) for name in self.mapping.model_fields_set})
 
     def axis_peaks(self, headings: Headings) -> dict[int, SignalName]:

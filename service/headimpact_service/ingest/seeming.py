@@ -1,0 +1,82 @@
+"""Columns that seem to be a signal, by a word for the quantity or by its unit, whatever their axes are called.
+
+No axis can be told from AP, 1 or forward, so nobody can read them without a mapping; but they are not passed over.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator
+
+from headimpact.recording import AXES, SIGNALS, SignalName
+from headimpact_service.ingest.headings import Headings
+from headimpact_service.ingest.spelling import unit_ending, unit_spelled
+from headimpact_service.ingest.table import Table
+
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_ACCELERATION = frozenset({"acc", "accel", "acceleration", "accelerometer", "beschleunigung", "lac"})
+_TURNING = frozenset({"ang", "angular", "rot", "rotational"})
+_VELOCITY = frozenset({"vel", "velocity", "rate", "speed"})
+_GYROSCOPE = frozenset({"gyr", "gyro", "gyroscope", "omega", "winkelgeschwindigkeit", "drehrate"})
+_LETTERS: dict[str, SignalName] = {
+    **dict.fromkeys(("ax", "ay", "az"), "linear_acceleration"),
+    **dict.fromkeys(("wx", "wy", "wz"), "angular_velocity"),
+}
+_CODE = re.compile(r"[0-9?]?[0-9A-Z?]{9,11}(AC|AV|AA)[XYZ][0-9A-Z?]")
+"""A channel's code as ISO-MME has it: 11HEADCG00H3ACXA."""
+_CODED: dict[str, SignalName] = {
+    "AC": "linear_acceleration",
+    "AV": "angular_velocity",
+    "AA": "angular_acceleration",
+}
+_NO_SAMPLES = frozenset(
+    {
+        *("peak", "pk", "max", "maximum", "min", "minimum", "largest", "pla", "pta", "pav", "prv", "paa", "pra"),
+        *("res", "resultant", "mag", "magnitude", "norm", "total", "mean", "average", "avg", "rms", "std", "sum"),
+        *("range", "threshold", "trigger", "triggered", "limit", "scale", "bias", "offset", "noise", "error"),
+        *(
+            "time",
+            "times",
+            "clock",
+            "status",
+            "valid",
+            "quality",
+            "filter",
+            "cutoff",
+            "bandwidth",
+            "sample",
+            "sampling",
+        ),
+        *("mass", "weight", "temperature", "temp", "serial", "id", "name", "unit", "units", "gain", "sensitivity"),
+    }
+)
+"""Words of what is said of a signal once, or of another quantity."""
+
+
+def seeming_signals(headings: Headings, table: Table, read: Collection[int]) -> dict[SignalName, list[str]]:
+    """Of each signal, three or more columns with samples that are not read and speak of it."""
+    found: dict[SignalName, list[str]] = {}
+    for column, heading in enumerate(headings.written):
+        if column not in read and table.has_samples(column):
+            for signal in _spoken_of(heading, headings.units.get(column)):
+                found.setdefault(signal, []).append(heading)
+    return {signal: columns for signal, columns in found.items() if len(columns) >= len(AXES)}
+
+
+def _spoken_of(heading: str, beside: str | None) -> Iterator[SignalName]:
+    if code := _CODE.fullmatch(heading):
+        yield _CODED[code[1]]
+        return
+    listed = [word.lower() for word in _WORD.findall(heading)]
+    words = set(listed)
+    if words & _NO_SAMPLES:
+        return
+    if words & _ACCELERATION or "alpha" in words:
+        yield "angular_acceleration" if words & _TURNING or "alpha" in words else "linear_acceleration"
+    elif words & _GYROSCOPE or (words & _TURNING and words & _VELOCITY):
+        yield "angular_velocity"
+    elif listed and listed[-1] in _LETTERS:
+        yield _LETTERS[listed[-1]]
+    else:
+        named = (signal for signal in SIGNALS if unit_spelled(signal, beside) or unit_ending(signal, heading))
+        yield from named
