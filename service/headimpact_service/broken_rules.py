@@ -26,7 +26,7 @@ RULES: Mapping[str, tuple[str, str]] = {
     "too_long": ("too-long", "At most {max_length} entries are taken."),
     "string_too_short": ("too-short", "The number of characters must be at least {min_length}."),
     "string_too_long": ("too-long", "The number of characters must be at most {max_length}."),
-    "string_pattern_mismatch": ("control-character", "Control characters are refused."),
+    "string_pattern_mismatch": ("control-character", "Control characters are refused, and blanks alone."),
     "literal_error": ("not-allowed", "One of these is needed: {expected}."),
     "greater_than": ("out-of-range", "A value above {gt:.15g} is needed."),
     "greater_than_equal": ("out-of-range", "A value of at least {ge:.15g} is needed."),

@@ -22,8 +22,9 @@ MAX_OPERATING_POINTS = 20
 MIN_CUT_OFF_HZ = 1.0
 """A lower one leaves nothing of an impact, and far below it the filter's equations are singular."""
 
-# No control characters: they have no place in a name, and PostgreSQL stores no NUL.
-PRINTABLE = r"^[^\u0000-\u001f\u007f]+$"
+# No control characters: they have no place in a name, and PostgreSQL stores no NUL. And no blanks alone, which in a
+# table are no name.
+PRINTABLE = r"^[^\u0000-\u001f\u007f]*[^\u0000-\u001f\u007f\s][^\u0000-\u001f\u007f]*$"
 
 MAX_NAME = 200
 

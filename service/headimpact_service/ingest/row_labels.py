@@ -10,6 +10,7 @@ from functools import partial
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.axis_peaks import unclear_axis
 from headimpact_service.ingest.blocks import (
+    STAY,
     are_named_apart,
     are_several,
     begins_anew,
@@ -29,6 +30,7 @@ from headimpact_service.ingest.windows import Rows, numbers_of
 
 _OR_ONE = "; if they are one, say so by an empty group_by"
 _SAY = "does not say the same"
+_ANY = "does not say something"
 _TIME = "does not say one time"
 _COUNT = "does not count on"
 
@@ -67,6 +69,8 @@ class RowLabels:
         for column in self.layout.labels:
             if len([cell for cell in self._distinct(column) if cell]) > 1:
                 raise self._several(column, _SAY, self._or_unread(column))
+            if self._ends(column):
+                raise self._several(column, _ANY, self._or_unread(column))
         if any(len(self._distinct(column)) > 1 for column in self.layout.occurred_at):
             self._require_one_time(self.layout.occurred_at, time_zone)
         for column, signal in self.layout.axis_peaks.items():
@@ -142,6 +146,13 @@ class RowLabels:
         cells = self.texts[column]
         return list(cells[self.rows] if isinstance(self.rows, slice) else map(cells.__getitem__, self.rows))
 
+    def _ends(self, column: int) -> bool:
+        """Whether, of samples without times, several rows say something and others nothing: two impacts' rows."""
+        if self.layout.has_order or self.layout.unread.said_one:
+            return False
+        there = [bool(said(cell)) for cell in self._cells(column)]
+        return 1 < sum(there) < len(there)
+
     def _distinct(self, column: int) -> list[str]:
         """What the impact's rows say in a column, in their order."""
         return list(dict.fromkeys(map(said, self._cells(column))))
@@ -150,6 +161,10 @@ class RowLabels:
         """Times that go on from sample to sample are those of the samples; others are of several impacts."""
         rows = numbers_of(self.rows)
         told = dict.fromkeys(tuple(said(self.texts[column][row]) for column in columns) for row in rows)
+        untold = not (self.layout.has_order or self.layout.unread.said_one)
+        stay = 1 < sum(map(any, told)) <= len(rows) // STAY
+        if untold and (stay or any(self._ends(column) for column in columns)):
+            raise self._several(columns[0], _TIME, _OR_ONE)
         order = self.layout.date_order
         moments = [moment_of("T".join(parts), time_zone, order) for parts in told if all(parts)]
         known = [when for when in moments if when is not None]

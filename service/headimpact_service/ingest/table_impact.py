@@ -34,10 +34,12 @@ from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
+from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.supplied import peak_said
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, numbers_of
+from headimpact_service.store import ids
 
 
 class TableImpact:
@@ -64,10 +66,13 @@ class TableImpact:
         self.labels.require_one_impact(options.time_zone)
         unscorable = self._text(self.layout.unscorable)
         recording = self._recording(scorable=unscorable is None)
+        athlete = options.athlete or self._name("athlete", self.layout.athlete)
+        by_id = options.athlete is None and self._is_our_id(athlete)
         return ImpactRecord(
             recording=recording,
             external_id=self._name("external_id", self.layout.external_id) or named.external_id,
-            athlete_external_id=options.athlete or self._name("athlete", self.layout.athlete),
+            athlete_id=athlete if by_id else None,
+            athlete_external_id=None if by_id else athlete,
             occurred_at=options.occurred_at or self._occurred_at() or named.occurred_at,
             device_serial=options.device or self._name("device", self.layout.device) or named.device,
             context=self._context(),
@@ -248,6 +253,13 @@ class TableImpact:
 
     def _name(self, field: str, column: int | None) -> str | None:
         return checked_name(self._named(column), field)
+
+    def _is_our_id(self, athlete: str | None) -> bool:
+        """Whether an athlete is given by our id, as this service's own lists have it: in a column athlete_id."""
+        column = self.layout.athlete
+        if athlete is None or column is None or compact(self.layout.headings[column]) != "athleteid":
+            return False
+        return ids.decode("ath", athlete) is not None
 
     def _context(self) -> dict[str, Any]:
         read = {"session_id": self._named}

@@ -67,7 +67,10 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
     count = 0
     may_space = layout.has_order or _names_one_impact(options)
-    for window in windows(blocks, layout.keys, parted=table.parted, max_single=max_single, may_space=may_space):
+    may_part = layout.has_order or layout.time_base is not None
+    for window in windows(
+        blocks, layout.keys, parted=table.parted, max_single=max_single, may_space=may_space, may_part=may_part
+    ):
         count += len(window.impacts)
         if count > options.max_impacts:
             raise Problem("import-too-large", f"An import may hold at most {options.max_impacts} impacts.")
@@ -259,10 +262,10 @@ def _require_no_other_rate(layout: Layout, plan: Plan, headings: Headings) -> No
     unread = set(range(len(headings.written))) - {*layout.numbers, *layout.texts}
     for column in sorted(unread):
         if speaks_of_times(headings.written[column]):
+            by_name = "" if column in headings.lone else "name it in a mapping's time, with its unit, or "
             raise file_fault(
-                f"The column {headings.written[column]} seems to say times or a rate and is not read: name it in a "
-                f"mapping's time, with its unit, or give sample_rate_hz beside the file ({plan.preset} would take "
-                f"{plan.mapping.sample_rate_hz:g} Hz).",
+                f"The column {headings.written[column]} seems to say times or a rate and is not read: {by_name}give "
+                f"sample_rate_hz beside the file ({plan.preset} would take {plan.mapping.sample_rate_hz:g} Hz).",
                 "rate-unclear",
                 parameter="sample_rate_hz",
             )

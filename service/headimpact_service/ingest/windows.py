@@ -37,11 +37,18 @@ class Window:
 
 
 def windows(
-    blocks: Iterable[Columns], keys: Sequence[int], *, parted: bool, max_single: int, may_space: bool = True
+    blocks: Iterable[Columns],
+    keys: Sequence[int],
+    *,
+    parted: bool,
+    max_single: int,
+    may_space: bool = True,
+    may_part: bool = True,
 ) -> Iterator[Window]:
     """The impacts of a table: as its format parts them, by the columns `keys`, or all rows as one impact.
 
-    Blocks of rows that blank lines part are one impact only where they `may_space`: times or the sender say so.
+    Blocks of rows that blank lines part are one impact only where they `may_space`: times or the sender say so. Those
+    of one key that stand apart are one only where they `may_part`: times put them in order.
 
     Raises
     ------
@@ -52,7 +59,7 @@ def windows(
     if parted:
         yield from _parted(blocks)
     elif keys:
-        yield from _keyed(blocks, keys)
+        yield from _keyed(blocks, keys, may_part=may_part)
     else:
         yield from _single(blocks, max_single, may_space=may_space)
 
@@ -91,8 +98,8 @@ def _single(blocks: Iterable[Columns], max_rows: int, *, may_space: bool) -> Ite
         yield Window(_stacked(held), [slice(0, count)], 0)
 
 
-def _keyed(blocks: Iterable[Columns], keys: Sequence[int]) -> Iterator[Window]:
-    parting = _Parting(keys)
+def _keyed(blocks: Iterable[Columns], keys: Sequence[int], *, may_part: bool) -> Iterator[Window]:
+    parting = _Parting(keys, may_part=may_part)
     held: list[Columns] = []
     first = count = 0
     for block in blocks:
@@ -113,8 +120,9 @@ def _keyed(blocks: Iterable[Columns], keys: Sequence[int]) -> Iterator[Window]:
 class _Parting:
     """Parts windows of rows by their keys, and remembers which impacts were given away."""
 
-    def __init__(self, keys: Sequence[int]) -> None:
+    def __init__(self, keys: Sequence[int], *, may_part: bool) -> None:
         self._keys = keys
+        self._may_part = may_part
         self._given: set[tuple[str, ...]] = set()
 
     def window(self, columns: Columns, first: int) -> tuple[Window | None, Columns]:
@@ -140,6 +148,7 @@ class _Parting:
         changed[:1] = True
         starts = np.flatnonzero(changed).tolist()
         keys = [tuple(said(columns.texts[index][row]) for index in self._keys) for row in starts]
+        _require_one_nothing(columns, self._keys, [row for row, key in zip(starts, keys, strict=True) if not any(key)])
         runs: list[tuple[tuple[str, ...], slice]] = []
         for key, pieces in groupby(zip(keys, starts, [*starts[1:], columns.rows], strict=True), itemgetter(0)):
             (_, start, stop), *further = pieces
@@ -152,8 +161,25 @@ class _Parting:
             parts.setdefault(key, []).append(rows)
         if not self._given.isdisjoint(parts):
             raise _unreadable(_APART)
+        if not self._may_part and len(parts) < len(runs) and any(rows.stop - rows.start > 1 for _, rows in runs):
+            again = next(rows[1] for rows in parts.values() if len(rows) > 1)
+            raise _unreadable(
+                f"In row {first + again.start + 1} below the headings an impact begins again whose rows ended before, "
+                "and the samples have no times that would put them in order. If it is another impact, name all columns "
+                "that tell them apart in a mapping's group_by; if it is the same, give the samples' times."
+            )
         self._given.update(parts)
         return Window(columns, [rows[0] if len(rows) == 1 else _joined(rows) for rows in parts.values()], first)
+
+
+def _require_one_nothing(columns: Columns, keys: Sequence[int], rows: Sequence[int]) -> None:
+    """Refuse names of impacts that are several words for nothing: NA and null are two impacts, or one mistake."""
+    written = {tuple(columns.texts[index][row].strip() for index in keys) for row in rows} - {("",) * len(keys)}
+    if len(written) > 1:
+        shown = " and ".join(sorted(" ".join(words) for words in written)[:2])
+        raise _unreadable(
+            f"What tells impacts apart is {shown}, which both mean that there is nothing: give each impact a name."
+        )
 
 
 def _without_empty(columns: Columns, runs: list[tuple[tuple[str, ...], slice]]) -> list[tuple[tuple[str, ...], slice]]:

@@ -7,6 +7,7 @@ links, encrypted entries and any method but stored and deflated.
 from __future__ import annotations
 
 import io
+import re
 import stat
 import struct
 import zipfile
@@ -126,9 +127,15 @@ def _is_of_a_desktop(path: str) -> bool:
     return path.startswith("__MACOSX/") or name.startswith("._") or name in {".DS_Store", "Thumbs.db", "desktop.ini"}
 
 
+_DRIVE = re.compile(r"[A-Za-z]:")
+"""A path of Windows begins with a letter and a colon; further on a colon is a part of a name, as in a time."""
+
+
 def _leads_out(path: str) -> bool:
     plain = path.replace("\\", "/")
-    return plain.startswith("/") or "\0" in path or ":" in plain or ".." in PurePosixPath(plain).parts
+    return (
+        plain.startswith("/") or "\0" in path or _DRIVE.match(plain) is not None or ".." in PurePosixPath(plain).parts
+    )
 
 
 def _unreadable(detail: str) -> Problem:

@@ -87,6 +87,17 @@ def test_an_impact_needs_its_athlete_by_exactly_one_id():
     assert read_impact(encoded(body(athlete={"id": "ath_1"}))).athlete_id == "ath_1"
 
 
+@pytest.mark.parametrize("blank", [" ", "   ", "\u00a0", "\u2003 "])
+def test_a_name_of_blanks_alone_is_no_name(blank: str):
+    for sent, place in (
+        (body(external_id=blank), "/external_id"),
+        (body(athlete={"external_id": blank}), "/athlete/external_id"),
+        (body(device={"serial": blank}), "/device/serial"),
+    ):
+        assert faults_of(sent) == [(place, "control-character")]
+    assert read_impact(encoded(body(external_id=f" a{blank}"))).external_id == f" a{blank}"
+
+
 @pytest.mark.parametrize(
     ("data", "said"),
     [

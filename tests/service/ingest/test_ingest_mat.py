@@ -261,6 +261,12 @@ class TestRates:
         found = records(mat({"impacts": noise(3, 100)} | beside), preset=PRESET, sample_rate_hz=2000.0)
         assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {2000.0}
 
+    def test_a_struct_beside_arrays_says_something_of_all_of_them(self):
+        told = {"subject": "p-1", "fs": 2000.0, "rotation": np.eye(3)}
+        found = records(mat({"impacts": noise(3, 100), "info": told}), preset=PRESET)
+        assert {record.recording.linear_acceleration.sample_rate_hz for record in found} == {2000.0}
+        assert [record.recording.linear_acceleration.values.shape for record in found] == [(100, 3)] * 3
+
     @pytest.mark.parametrize("struct", [False, True])
     def test_a_lone_number_is_no_column_of_times(self, struct: bool):
         values = noise(1, 100)[0]

@@ -416,3 +416,48 @@ def test_what_is_measured_once_an_impact_parts_the_rows(heading: str, cells: lis
 def test_what_a_slow_sensor_measures_parts_nothing(heading: str):
     rows = [[20.5 + n // 20, *row] for n, row in enumerate(six_axis(100).tolist())]
     assert shape(one(table([heading, *COLUMNS], rows), sample_rate_hz=1000.0)) == 100
+
+
+class TestNamesAndTimes:
+    """What is read of an impact, of samples without times."""
+
+    @pytest.mark.parametrize("heading", ["impact_id", "external_id"])
+    def test_a_name_that_comes_back_is_not_taken_for_the_same_impact(self, heading: str) -> None:
+        problem = refused(untimed(heading, each(1, 2, 1)), sample_rate_hz=1000.0)
+        assert problem.slug == "unreadable-file"
+        assert "In row 81 below the headings an impact begins again" in problem.detail
+
+    def test_with_times_its_rows_may_stand_apart(self) -> None:
+        heading, *lines = csv_text().splitlines()
+        parts = [f"{name},{line}" for part in (lines[:20], lines[20:]) for name in ("a", "b") for line in part]
+        found = read("\n".join([f"impact_id,{heading}", *parts]))
+        assert [shape(record) for record in found] == [40, 40]
+
+    def test_rows_that_take_turns_have_an_order(self) -> None:
+        _, *lines = (line.partition(",")[2] for line in csv_text().splitlines())
+        first = csv_text().splitlines()[0].partition(",")[2]
+        rows = [f"{name},{line}" for line in lines for name in ("a", "b")]
+        assert [shape(record) for record in read("\n".join([f"impact_id,{first}", *rows]), sample_rate_hz=1000.0)] == [
+            40,
+            40,
+        ]
+
+    @pytest.mark.parametrize("apart", ["10:00:00.110Z", "10:00:00.450Z", "10:00:01Z"])
+    def test_times_that_stay_for_many_rows_are_those_of_impacts(self, apart: str) -> None:
+        told = each("2026-11-20T10:00:00Z", f"2026-11-20T{apart}")
+        text = untimed("occurred_at", told, records=2)
+        assert codes(refused(text, sample_rate_hz=1000.0)) == [(None, "several-impacts")]
+        assert shape(one(text, mapping=Mapping.model_validate({"group_by": []}), sample_rate_hz=1000.0)) == 80
+
+    @pytest.mark.parametrize("heading", ["athlete", "device", "session_id", "occurred_at"])
+    def test_what_half_of_the_rows_say_parts_them(self, heading: str) -> None:
+        said = "2026-11-20T10:00:00Z" if heading == "occurred_at" else "one"
+        text = untimed(heading, each(said, ""), records=2)
+        assert codes(refused(text, sample_rate_hz=1000.0)) == [(None, "several-impacts")]
+        once = untimed(heading, [said, *[""] * 39], records=1)
+        assert shape(one(once, sample_rate_hz=1000.0)) == 40
+
+    @pytest.mark.parametrize("words", [("NA", "null"), ("missing", "-")])
+    def test_two_words_for_nothing_are_no_name(self, words: tuple[str, str]) -> None:
+        problem = refused(untimed("impact_id", each(*words), records=2), sample_rate_hz=1000.0)
+        assert "give each impact a name" in problem.detail

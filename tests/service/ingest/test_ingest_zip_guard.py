@@ -47,6 +47,11 @@ def test_a_path_that_leads_out_is_refused(name: str):
     assert "leads out" in detail_of(zipped({name: "x"}))
 
 
+@pytest.mark.parametrize("name", ["MG1-1-2026-11-20T10:05:06Z.csv", "Test 12:30/test.mme", "Spiel 1: Köln/a.csv"])
+def test_a_colon_within_a_name_leads_nowhere(name: str):
+    assert GuardedZip(zipped({name: "x"})).read(name) == b"x"
+
+
 def test_an_entry_without_a_name_is_refused():
     data = bytearray(zipped({"a": "x"}))
     directory = data.index(b"PK\x01\x02")

@@ -45,6 +45,19 @@ class TestImport:
             assert answer.json()["data"][0]["status"] == status
         assert len(api.get("/v1/impacts").json()["data"]) == 1
 
+    def test_a_column_athlete_id_holds_our_ids_as_our_own_lists_do(self, api: Api) -> None:
+        known = api.post("/v1/athletes", json={"external_id": "p-1"}).json()["id"]
+        heading, *rows = table().decode().splitlines()
+        for column, external_id in (("athlete_id", "p-1"), ("player", known)):
+            text = "\n".join([f"{column},{heading}", *(f"{known},{row}" for row in rows)])
+            mapping = json.dumps(MAPPING | {"athlete": column})
+            day = "2026-11-20" if column == "player" else "2026-11-21"
+            row = upload(api, text.encode(), mapping=mapping, occurred_at=f"{day}T19:04:05Z").json()["data"][0]
+            assert api.get(f"/v1/impacts/{row['id']}").json()["athlete"]["external_id"] == external_id
+        text = "\n".join([f"athlete_id,{heading}", *(f"{known[:-4]}0000,{row}" for row in rows)])
+        row = upload(api, text.encode(), mapping=json.dumps(MAPPING)).json()["data"][0]
+        assert (row["status"], row["problem"]["status"]) == ("failed", 404)
+
     def test_what_was_deleted_does_not_come_back_with_its_file(self, api: Api) -> None:
         fields = FIELDS | {"mapping": json.dumps(MAPPING)}
         created = upload(api, table(), **fields).json()["data"][0]["id"]

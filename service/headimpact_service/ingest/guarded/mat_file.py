@@ -31,6 +31,7 @@ MAX_INFLATED = 32 * 1024 * 1024
 MAX_ELEMENTS = 10_000
 MAX_DEPTH = 8
 """Of structs within structs."""
+_FEW = 8
 ALONE = "array"
 """The other name of an array that is the only one."""
 _HEADER = 128
@@ -43,7 +44,7 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
     _require_small(stream)
     stream.seek(0)
     document: dict[str, Any] = loadmat(stream)  # type: ignore[arg-type] # the stubs know of paths only
-    variables = {name: value for name, value in document.items() if not name.startswith("__")}
+    variables = _with_facts({name: value for name, value in document.items() if not name.startswith("__")})
     structs = [value for value in variables.values() if _is_struct(value)]
     cells = {name: value for name, value in variables.items() if _is_cells(value)}
     if structs:
@@ -57,6 +58,33 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
             yield NamedTable(None, _table_of([shared | _of_cell(name, cell) for cell in value.reshape(-1)]))
     else:
         yield NamedTable(None, _arrays(variables))
+
+
+def _with_facts(variables: dict[str, Any]) -> dict[str, Any]:
+    """The variables, where some are arrays of samples, with the fields of structs that hold none in their place.
+
+    Such a struct says something of all of them: a rate, the athlete.
+    """
+    if not any(isinstance(value, np.ndarray) and _is_long(value) for value in variables.values()):
+        return variables
+    told = {name: value for name, value in variables.items() if _is_struct(value) and not _holds_long(value)}
+    facts = [_flat(struct.reshape(-1)[0]) for struct in told.values() if struct.size == 1]
+    rest = {name: value for name, value in variables.items() if name not in told}
+    return {name: fact for fields in facts for name, fact in fields.items()} | rest
+
+
+def _is_long(value: AnyArray) -> bool:
+    """Whether it may be samples: more numbers than a setting has."""
+    return value.dtype.kind in "fiu" and max(value.shape, default=0) > _FEW
+
+
+def _holds_long(struct: AnyArray, depth: int = 0) -> bool:
+    """Whether a struct, or one within it, holds what may be samples."""
+    cells = [record[name] for record in struct.reshape(-1) for name in struct.dtype.names or ()]
+    arrays = [cell for cell in cells if isinstance(cell, np.ndarray)]
+    return any(
+        _is_long(cell) or (_is_struct(cell) and depth < MAX_DEPTH and _holds_long(cell, depth + 1)) for cell in arrays
+    )
 
 
 def _table_of(impacts: list[dict[str, Any]]) -> ArrayTable | StructTable:
