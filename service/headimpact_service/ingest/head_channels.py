@@ -132,11 +132,16 @@ class _Head:
             self._note("sample_count_mismatch", detail, channel)
 
     def _chosen(self, signal: SignalName) -> list[HeadChannel]:
-        """One channel an axis: of one filter where one has all three, the weakest; a valid one before an invalid."""
+        """One channel an axis: of one filter and place where one has all three, the weakest; a valid one before others.
+
+        What is said to be at the centre of gravity goes before what is only said to be the head's.
+        """
         mine = [c for c in self.channels if c.code.signal == signal and c.code.axis != RESULTANT]
-        axes_of = {f: {c.code.axis for c in mine if c.code.strength == f} for f in {c.code.strength for c in mine}}
+        axes_of: dict[tuple[int, bool], set[str]] = {}
+        for channel in mine:
+            axes_of.setdefault(_kind(channel), set()).add(channel.code.axis)
         best: dict[str, HeadChannel] = {}
-        for channel in sorted(mine, key=lambda c: (len(axes_of[c.code.strength]) < 3, _rank(c))):
+        for channel in sorted(mine, key=lambda c: (len(axes_of[_kind(c)]) < 3, _rank(c))):
             best.setdefault(channel.code.axis, channel)
         return [best[axis] for axis in AXES if axis in best]
 
@@ -181,9 +186,14 @@ class _Head:
         return {"channels": names, "filtered_before": filters}
 
 
-def _sameness(channel: HeadChannel) -> tuple[SignalName, str, int, bool]:
-    return channel.code.signal, channel.code.axis, channel.code.strength, channel.invalid is not None
+def _sameness(channel: HeadChannel) -> tuple[SignalName, str, tuple[int, bool], bool]:
+    return channel.code.signal, channel.code.axis, _kind(channel), channel.invalid is not None
 
 
-def _rank(channel: HeadChannel) -> tuple[bool, int, str]:
-    return channel.invalid is not None, channel.code.strength, channel.code.code
+def _kind(channel: HeadChannel) -> tuple[int, bool]:
+    """Its filter, the weakest first, and its place, the one that is said outright first."""
+    return channel.code.strength, not channel.code.is_explicit
+
+
+def _rank(channel: HeadChannel) -> tuple[bool, tuple[int, bool], str]:
+    return channel.invalid is not None, _kind(channel), channel.code.code

@@ -41,6 +41,11 @@ class HeadCode:
         return self.code[:2]
 
     @property
+    def is_explicit(self) -> bool:
+        """Whether it says the centre of gravity, and not only the head."""
+        return "CG" in {self.code[6:8], self.code[8:10]}
+
+    @property
     def filtering(self) -> str:
         """The filter that the last letter names."""
         return FILTERS.get(self.code[15], "unknown")

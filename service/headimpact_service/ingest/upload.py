@@ -61,6 +61,9 @@ def sample_count(item: ImpactRecord | Problem) -> int:
 def _read_zip(source: Source, options: ImportOptions) -> Impacts:
     with source.open() as stream:
         archive = GuardedZip(stream)
+        if is_nhtsa(archive.names) and is_iso_mme(archive.names):
+            detail = "The zip archive holds a test of NHTSA's and a set of ISO-MME: send each in an archive of its own."
+            raise Problem("unreadable-file", detail)
         for fits, read in ARCHIVES:
             if fits(archive.names):
                 yield from read(archive, options)

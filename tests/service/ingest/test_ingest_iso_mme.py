@@ -140,6 +140,22 @@ class TestCodes:
         record = one(iso_mme(channels() | channels(strong) | channels(raw)))
         assert peaks(record, "linear_acceleration") == pytest.approx([30.0, -12.0, 7.5])
 
+    def test_what_is_said_to_be_at_the_centre_of_gravity_goes_before_what_is_only_the_head_s(self):
+        only = {
+            code[:6] + "00" + code[8:]: (unit, 2.0 * peak) for code, (unit, peak) in ISO_CODES.items() if "CG" in code
+        }
+        for held in (channels() | channels(only), channels(only) | channels()):
+            record = one(iso_mme(held))
+            assert peaks(record, "linear_acceleration") == pytest.approx([30.0, -12.0, 7.5])
+            assert notes(record, "channel_given_twice") == []
+        partly = {code: said for code, said in channels().items() if code != AX}
+        whole = one(iso_mme(partly | channels(only)))
+        assert peaks(whole, "linear_acceleration") == pytest.approx([60.0, -24.0, 15.0])
+
+    def test_beside_a_test_of_another_kind_it_is_not_read_in_part(self):
+        both = {"a/v1.EV5": "x", "a/v1.001": "x", "b/test.mme": "x", "b/channel/t.001": "x", "b/channel/t.chn": "x"}
+        assert "send each in an archive of its own" in refused(zipped(both)).detail
+
     def test_a_set_without_a_head_says_so(self):
         problem = refused(iso_mme({"11CHST0000H3ACXA": channel("11CHST0000H3ACXA", "g", [0.0, 1.0, 0.0])}))
         assert "no channel at a head's centre of gravity" in problem.detail
