@@ -13,7 +13,7 @@ from sqlalchemy import BindParameter, Connection, bindparam, select, update
 from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import athletes as athlete_store
 from headimpact_service.store import devices as device_store
-from headimpact_service.store import erasure, labels
+from headimpact_service.store import erasure, ids, labels
 from headimpact_service.store.clock import later_than, next_change
 from headimpact_service.store.impact_inserts import content_members, first_row, insert_revisions, insert_rows
 from headimpact_service.store.impact_known import Known, look_up
@@ -100,6 +100,7 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
     if same_event_is_unchanged and known.same_content is not None:
         same = _same_event(conn, data_set_id, new, known)
         if same is not None:
+            _require_same_marks(new, same)
             return Outcome("unchanged", same)
     if same_event_is_unchanged and _was_deleted(conn, data_set_id, new):
         raise Problem("impact-deleted", "This impact was deleted; to store it again, send it to POST /v1/impacts.")
@@ -126,6 +127,20 @@ def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: Kno
     }
     found = _SAME_EVENT.first(conn, parameters)
     return None if found is None else get(conn, data_set_id, found[0])
+
+
+def _require_same_marks(new: NewImpact, present: Impact) -> None:
+    """Refuse to take for unchanged what is now said not to be valid, or not to have been worn, or so no more."""
+    marks = [
+        (bool((document or {}).get("unscorable")), (context or {}).get("worn"))
+        for document, context in ((new.document, new.context), (present.document, present.context))
+    ]
+    if marks[0] != marks[1]:
+        raise Problem(
+            "conflict",
+            f"The same signals are stored as {ids.encode('imp', present.id)} with another mark of their validity, or "
+            "of whether the device was worn: correct that impact, or delete it and send this one to POST /v1/impacts.",
+        )
 
 
 def _was_deleted(conn: Connection, data_set_id: bytes, new: NewImpact) -> bool:

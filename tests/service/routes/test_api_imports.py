@@ -45,6 +45,25 @@ class TestImport:
             assert answer.json()["data"][0]["status"] == status
         assert len(api.get("/v1/impacts").json()["data"]) == 1
 
+    @pytest.mark.parametrize(
+        ("before", "now"),
+        [
+            ({}, {"unscorable": ["The accelerometer was loose."]}),
+            ({"unscorable": ["The accelerometer was loose."]}, {}),
+            ({}, {"context": {"worn": False}}),
+        ],
+    )
+    def test_a_changed_mark_of_validity_is_not_taken_for_unchanged(
+        self, api: Api, before: dict[str, Any], now: dict[str, Any]
+    ) -> None:
+        sent = {name: value for name, value in impact_body().items() if name != "external_id"}
+        first, later = (json.dumps(sent | changes).encode() for changes in (before, now))
+        created = upload(api, first, "application/json").json()["data"][0]["id"]
+        row = upload(api, later, "application/json").json()["data"][0]
+        assert (row["status"], row["problem"]["type"]) == ("failed", "/problems/conflict")
+        assert created in row["problem"]["detail"]
+        assert upload(api, first, "application/json").json()["summary"]["unchanged"] == 1
+
     def test_a_column_athlete_id_holds_our_ids_as_our_own_lists_do(self, api: Api) -> None:
         known = api.post("/v1/athletes", json={"external_id": "p-1"}).json()["id"]
         heading, *rows = table().decode().splitlines()
