@@ -82,6 +82,7 @@ class CsvTable:
         self._joined = False
         self._blank_lines = BlankLines()
         self._ends: list[int] = []  # the line that each row of a block ends in
+        self._passed: list[str] = []  # the first lines that are skipped, or comments
         above, heading, has_units = self._find_headings(skip_rows)
         self._delimiter = delimiter_of(heading)
         self._decimal_mark = ""
@@ -89,7 +90,7 @@ class CsvTable:
         self._decimal_points = text.has_decimal_points(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
         headings = self._rows(reader, 1)[0]
-        self.above = [cells_of(line, self._delimiter) for line in above]
+        self.above = [cells_of(line, self._delimiter) for line in (*self._passed, *above)]
         self.headings: tuple[str, ...] = tuple(joined(self.above[-1] if above else [], headings))
         self._repeated = [heading.strip() for heading in headings]
         self.units: Mapping[int, str] = self._read_units(reader) if has_units else {}
@@ -150,6 +151,8 @@ class CsvTable:
             if number >= skip_rows and line.strip() and not line.startswith("#") and not _SEPARATOR.fullmatch(line):
                 self._line = number
                 return line
+            if number < LOOK:
+                self._passed.append(line)
         raise unreadable("The file has no line of headings.")
 
     def _blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:

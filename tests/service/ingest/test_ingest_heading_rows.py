@@ -290,3 +290,23 @@ def test_each_sensor_may_have_its_own_column_of_one_heading():
     a, w = record.recording.linear_acceleration, record.recording.angular_velocity
     assert w.time_s[0] - a.time_s[0] == pytest.approx(0.003)
     assert w.time_s[1] - w.time_s[0] == pytest.approx(0.0005)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Sample rate (Hz),2000",
+        "Sample rate,2000 Hz",
+        "Sample rate (Hz): 2000",
+        "Rate: 2 kHz",
+        "Sample interval (ms),0.5",
+        "# Sample rate (Hz),2000",
+        "#Sample rate = 2000 Hz",
+    ],
+)
+def test_a_rate_that_is_stated_above_the_headings_is_held_against_the_sender_s(line: str):
+    text = f"{line}\n{GENERIC.partition(',')[2]}\n" + "\n".join(
+        row.partition(",")[2] for row in csv_text().splitlines()[1:]
+    )
+    assert codes(refused(text, sample_rate_hz=1000.0)) == [("sample_rate_hz", "rate-differs")]
+    assert one(text, sample_rate_hz=2000.0).recording.linear_acceleration.sample_rate_hz == 2000.0
