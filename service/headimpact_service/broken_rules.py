@@ -33,7 +33,11 @@ RULES: Mapping[str, tuple[str, str]] = {
     "less_than": ("out-of-range", "A value below {lt:.15g} is needed."),
     "less_than_equal": ("out-of-range", "A value of at most {le:.15g} is needed."),
     "cut_off_form": ("wrong-type", "A filter is a cut-off in Hz, CFC60, CFC180, CFC600, CFC1000 or null."),
-    "filter_form": ("wrong-type", 'A filter is "paper", "none" or an object with a cut-off for each signal.'),
+    "filter_form": (
+        "wrong-type",
+        'A filter is "paper", "none" or an object with a cut-off for each signal, as '
+        '{{"linear_acceleration": "CFC180", "angular_velocity": 184}}.',
+    ),
 }
 """The rules by pydantic's name of the fault: our code, and the sentence."""
 
@@ -41,6 +45,8 @@ RULES: Mapping[str, tuple[str, str]] = {
 def broken_rule(fault: ErrorDetails) -> tuple[str, str]:
     """The code and the sentence of a fault."""
     code, sentence = RULES.get(fault["type"], ("invalid", "The value does not fit here."))
+    if fault.get("ctx", {}).get("expected") == "'paper' or 'none'":  # a text may be neither, but an object, too
+        sentence = RULES["filter_form"][1]
     if fault["type"] == "value_error":  # raised by a validator of our own, in a sentence of our own
         sentence = "{error}"
     return code, sentence.format_map(fault.get("ctx", {}))

@@ -30,7 +30,7 @@ from headimpact_service.ingest.dts_header import (
     without_empty_end,
 )
 from headimpact_service.ingest.dts_rate import sample_rate, with_mapped_rate
-from headimpact_service.ingest.file_faults import file_fault
+from headimpact_service.ingest.file_faults import file_fault, unit_unknown
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.iso_codes import HeadCode, head_code
@@ -224,7 +224,7 @@ class _Data:
     def _curve(self, code: HeadCode, index: int) -> Curve:
         unit = unit_spelled(code.signal, self.header.of_channel("unit", index))
         if unit is None:
-            raise file_fault(f"The unit of {self.named(index)} is none that is known for it.", "unit-missing")
+            raise unit_unknown(self.named(index), code.signal)
         values = self.values(index)
         stamps: FloatArray = (np.arange(values.size, dtype=np.float64) - (self.points_before or 0.0)) / self.rate
         return Curve(code.axis, unit, values, stamps, self.rate)

@@ -186,8 +186,8 @@ class _Head:
         return {"channels": names, "filtered_before": filters}
 
 
-def _sameness(channel: HeadChannel) -> tuple[SignalName, str, tuple[int, bool], bool]:
-    return channel.code.signal, channel.code.axis, _kind(channel), channel.invalid is not None
+def _sameness(channel: HeadChannel) -> tuple[SignalName, str, int, bool]:
+    return channel.code.signal, channel.code.axis, channel.code.strength, channel.invalid is not None
 
 
 def _kind(channel: HeadChannel) -> tuple[int, bool]:

@@ -15,7 +15,7 @@ import numpy as np
 from headimpact.quality import QualityNote
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve
-from headimpact_service.ingest.file_faults import file_fault
+from headimpact_service.ingest.file_faults import file_fault, unit_unknown
 from headimpact_service.ingest.head_channels import HeadChannel, head_impacts
 from headimpact_service.ingest.iso_codes import HeadCode, head_code, is_time
 from headimpact_service.ingest.iso_mme_files import Header, listed_channels, read_channel, read_header
@@ -146,7 +146,7 @@ class _Test:
         header, values = self._file(number)
         unit = unit_spelled(code.signal, header.text("unit"))
         if unit is None:
-            raise file_fault(f"The unit of {_named(code, number)} is none that is known for it.", "unit-missing")
+            raise unit_unknown(_named(code, number), code.signal)
         stamps, rate = self._stamps(header, values.size, _named(code, number))
         full_scale = header.number("channel amplitude class")
         return Curve(code.axis, unit, values, stamps, rate, full_scale if full_scale and full_scale > 0 else None)

@@ -15,7 +15,7 @@ from headimpact.quality import QualityNote, check_reported_resultant
 from headimpact.recording import AXES, SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.curves import Curve, check_cut, check_twice, head_recording
-from headimpact_service.ingest.file_faults import file_fault
+from headimpact_service.ingest.file_faults import file_fault, unit_unknown
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass
 from headimpact_service.ingest.nhtsa_header import (
@@ -174,7 +174,7 @@ class _Head:
             raise file_fault(f"The times of {channel.named} must increase in equal steps.", "time-not-increasing")
         self._compare_times(channel, float(stamps[0]), rate)
         if channel.unit is None:
-            raise file_fault(f"The unit of {channel.named} is none that is known for it.", "unit-missing")
+            raise unit_unknown(channel.named, channel.signal)
         return Curve(channel.axis, channel.unit, values, stamps, rate, channel.full_scale)
 
     def _compare_times(self, channel: Channel, first_s: float, rate: float) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 from headimpact.recording import SignalName
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.spelling import unit_spelled
 
 HEAD_CG = "HDCG"
 INVALID = {
@@ -119,7 +120,7 @@ def _channel(row: list[str]) -> Channel | None:
         signal=signal,
         axis=_AXES[row[5]],
         curve=curve,
-        unit=_UNITS[signal].get(row[7].upper()),
+        unit=_UNITS[signal].get(row[7].upper()) or unit_spelled(signal, row[7]),
         full_scale=_positive(row[11]),
         points=None if first is None or last is None else last - first + 1,
         first=first,

@@ -44,6 +44,11 @@ def known_units() -> frozenset[str]:
     return frozenset(spelling for spellings in _units().values() for spelling in spellings)
 
 
+def units_of(signal: str) -> list[str]:
+    """The units that a signal may be in."""
+    return list(vocabulary()[signal]["units"])
+
+
 def unit_spelled(signal: str, text: str | None) -> str | None:
     """The unit that a text names, if it is one of the signal's."""
     return None if text is None else _units()[signal].get(compact(text))
