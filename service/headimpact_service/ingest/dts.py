@@ -42,7 +42,7 @@ from headimpact_service.ingest.spelling import unit_spelled
 from headimpact_service.ingest.stamps import follows
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.tabular import read_table
-from headimpact_service.ingest.text_facts import unreadable
+from headimpact_service.ingest.text_facts import UTF_16, unreadable
 
 PRESET = "dts"
 MAX_FILE = 64 * 1024 * 1024
@@ -62,7 +62,7 @@ def is_dts(head: bytes) -> bool:
 
 def decoded_head(head: bytes) -> list[str]:
     """The whole lines of a file's beginning, in any of the encodings that laboratories use."""
-    text = head.decode("latin-1")
+    text = head.decode("utf-16", "ignore") if head.startswith(UTF_16) else head.decode("latin-1")
     return [line.strip() for line in text.split("\n")]
 
 

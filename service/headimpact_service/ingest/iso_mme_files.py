@@ -11,6 +11,7 @@ import numpy as np
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.table import FloatArray
+from headimpact_service.ingest.text_facts import UTF_16
 
 NO_VALUE = "NOVALUE"
 MAX_FILE = 4 * 1024 * 1024
@@ -41,7 +42,9 @@ NUMBER = r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?"
 
 
 def decoded(data: bytes) -> str:
-    """Text in whichever encoding its laboratory writes: UTF-8, else CP1252, which Latin-1 completes."""
+    """Text in whichever encoding its laboratory writes: marked UTF-16, UTF-8, else CP1252, which Latin-1 completes."""
+    if data.startswith(UTF_16):
+        return data.decode("utf-16", "replace")
     for encoding in ("utf-8-sig", "cp1252"):
         try:
             return codecs.decode(data, encoding)

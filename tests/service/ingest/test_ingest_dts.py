@@ -209,6 +209,11 @@ def test_a_missing_value_is_422_with_its_place_and_filled_where_that_is_asked_fo
     assert refused("\r\n".join(lines)).status == 422
 
 
+def test_a_spreadsheet_s_utf_16_is_read_too():
+    plain, wide = one(dts()), one(dts().encode("utf-16"))
+    np.testing.assert_array_equal(plain.recording.linear_acceleration.values, wide.recording.linear_acceleration.values)
+
+
 def test_a_table_is_no_dts_file():
     assert not is_dts(csv_text().encode())
     assert not is_dts(b"Sample Num,Linear Acc x g\n1,2\n")
