@@ -18,6 +18,7 @@ RULES: Mapping[str, tuple[str, str]] = {
     "int_type": ("wrong-type", "A whole number is needed."),
     "string_type": ("wrong-type", "Text is needed."),
     "bool_type": ("wrong-type", "true or false is needed."),
+    "bool_parsing": ("wrong-type", "true or false is needed; 1 and 0 are taken, too."),
     "list_type": ("wrong-type", "A list is needed."),
     "dict_type": ("wrong-type", "An object is needed."),
     "model_type": ("wrong-type", "An object is needed."),

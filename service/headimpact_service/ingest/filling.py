@@ -25,6 +25,8 @@ def how_filled(values: FloatArray, index: int) -> str:
         return ""
     if short_runs(unknown)[index]:
         return f": {FILLED}"
+    if unknown.all():
+        return ": it holds nothing at all; three axes are needed, unless constrained_plane says which of them are zero"
     at_edge = unknown[: index + 1].all() or unknown[index:].all()
     return ": leave out the samples at the record's edge that lack it" if at_edge else ""
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.cells import is_written_number
 from headimpact_service.ingest.headings import layout_problem
 from headimpact_service.ingest.options import ImportOptions
 
@@ -29,6 +30,8 @@ def with_remedies(headings: Sequence[str], options: ImportOptions, format_name: 
     """The same with what helps in this sort of file."""
     named = "" if options.preset is None else f" of the preset {options.preset}"
     remedy = "name a preset, or send a mapping" if options.preset is None else "send a mapping"
+    if format_name == "csv" and any(headings) and all(map(is_written_number, filter(None, headings))):
+        return layout_problem("The file begins with numbers: write headings above its columns.", code=CODE)
     asked = f"The columns of no signal{named} were found: {remedy} from columns to signals"
     if format_name == "mat":
         asked += (

@@ -378,3 +378,14 @@ def test_a_time_that_is_missing_is_none_that_can_be_filled():
     problem = refused("\n".join(lines))
     assert "Column 1 (t_s)" in problem.detail
     assert "fill_gaps" not in problem.detail
+
+
+def test_a_file_without_headings_is_told_so():
+    problem = refused("\n".join(csv_text().splitlines()[1:]))
+    assert problem.detail == "The file begins with numbers: write headings above its columns."
+
+
+def test_an_axis_that_holds_nothing_at_all_is_told_so():
+    heading, *lines = csv_text().splitlines()
+    empty = [",".join([*line.split(",")[:3], "", *line.split(",")[4:]]) for line in lines]
+    assert "three axes are needed" in refused("\n".join([heading, *empty])).detail
