@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from headimpact.kinematics import Motion
 from headimpact.published import QUALITY_LIMITS
+from headimpact.recording import CRITERIA_UNITS
 
 FloatArray = NDArray[np.float64]
 Severity = Literal["note", "warning"]
@@ -109,12 +110,13 @@ def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: 
 
 def _extreme_values(channels: Sequence[Channel], peaks: FloatArray) -> Iterator[QualityNote]:
     for channel, peak in zip(channels, peaks.tolist(), strict=True):
-        bound = QUALITY_LIMITS[channel.signal]["extreme"]
+        bound, unit = QUALITY_LIMITS[channel.signal]["extreme"], CRITERIA_UNITS[channel.signal]
         if peak > highest_of(channel.signal, "extreme"):
             yield _warning(
                 "extreme_value",
                 channel,
-                f"The {words(channel.signal)} reaches {peak:.4g} on {channel.axis}; few heads go beyond {bound:g}.",
+                f"The {words(channel.signal)} reaches {peak:.4g} {unit} on {channel.axis}; few heads go beyond "
+                f"{bound:g}.",
             )
 
 

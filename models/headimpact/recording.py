@@ -34,6 +34,8 @@ TO_CRITERIA_UNIT: dict[str, float] = {
     "deg/s^2": radians(1.0),
 }
 """What a unit of a signal is in the criteria's: g, rad/s and rad/s^2."""
+CRITERIA_UNITS: dict[str, str] = dict(zip(SIGNALS, ("g", "rad/s", "rad/s^2"), strict=True))
+"""The unit that criteria are computed in, of each signal."""
 
 ROTATION_TOLERANCE = 1e-3
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import re
@@ -14,6 +15,8 @@ from headimpact_service.answers import problem_answer
 from headimpact_service.errors import Problem
 
 LOG = logging.getLogger("headimpact.request")
+RETRY_AFTER_S = "10"
+"""When to try again a service that is shutting down: another one takes a while to start."""
 _USABLE_ID = re.compile(rb"[\w.:/+=@-]{1,128}", re.ASCII)
 _ALWAYS = ((b"x-content-type-options", b"nosniff"), (b"referrer-policy", b"no-referrer"))
 _PRIVATE = (b"cache-control", b"no-store")
@@ -47,6 +50,12 @@ class Edge:
 
         try:
             await self.app(scope, receive, send_with_id)
+        except asyncio.CancelledError:  # nobody cancels a request but the server that is told to stop, at its last
+            LOG.warning("cut_off", extra=_fields(scope, request_id))
+            if status:
+                raise
+            problem = Problem("unavailable", "The service is shutting down.", headers={"Retry-After": RETRY_AFTER_S})
+            await problem_answer(problem)(scope, receive, send_with_id)
         except Exception:
             LOG.exception("uncaught", extra=_fields(scope, request_id))
             if status:  # too late for another answer: end the connection, so that the client sees a broken one

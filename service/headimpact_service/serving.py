@@ -73,7 +73,10 @@ class GuardedProtocol(HttpToolsProtocol):
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's own words are not for callers
         """What is no HTTP, or a head of more than 64 KiB, gets the same form of answer as everything else."""
-        detail = "This is not an HTTP/1.1 request, or its method is none that is known, or its head is too long."
+        detail = (
+            "This is not an HTTP/1.1 request, or its method is none that is known, its head is too long, or its body "
+            "is not in chunks as they are announced."
+        )
         problem = Problem("malformed-request", detail)
         body = json_bytes(problem.as_dict())
         head = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -73,13 +74,20 @@ def validation_problem(error: ValidationError, data: bytes, *, what: str = "body
     """The problem that a failed validation of the JSON text `data` is."""
     faults = error.errors(include_url=False, include_input=False)
     if faults[0]["type"] == "json_invalid":
+        if not data.strip():
+            return Problem("malformed-request", f"The {what} is empty.")
+        if data.startswith(_MARKS):
+            return Problem(
+                "malformed-request", f"The {what} begins with a byte order mark: JSON is UTF-8, and has none."
+            )
         return Problem("malformed-request", f"The {what} is not JSON: {_reason(faults[0])}.")
     return rules_problem(payload_errors(faults, from_json(data)), what=what, count=len(faults))
 
 
 def too_many_members(what: str) -> Problem:
     """The 400 for so many members, or ones so deeply nested, that naming what is wrong would be the attack."""
-    return Problem("malformed-request", f"The {what} has more than {MAX_MEMBERS} members, which no request needs.")
+    detail = f"The {what} has more than {MAX_MEMBERS} members, lists or objects, which no request needs."
+    return Problem("malformed-request", detail)
 
 
 def rules_problem(errors: Sequence[PayloadError], *, what: str = "body", count: int = 0) -> Problem:
@@ -158,6 +166,7 @@ def _holds(node: Any, step: object) -> bool:  # noqa: ANN401 - any JSON
     return isinstance(node, list) and isinstance(step, int) and step < len(node)
 
 
+_MARKS = (codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _REASONS = (
     ("recursion limit", "it is nested too deeply"),
     ("EOF", "it ends before it is complete"),
@@ -165,8 +174,9 @@ _REASONS = (
     ("trailing comma", "a comma stands before a closing bracket"),
     ("key must be a string", "a member's name is no text in double quotes"),
     ("control character", "a text holds a control character that is not escaped"),
-    ("escape", "a text holds an escape that JSON does not have"),
     ("surrogate", "a text holds half a surrogate pair"),
+    ("end of hex escape", "a text holds half a surrogate pair"),
+    ("escape", "a text holds an escape that JSON does not have"),
     ("unicode", "a text is not UTF-8"),
     ("number", "a number is not written as JSON has it"),
     ("expected `,`", "a comma or a closing bracket is missing"),

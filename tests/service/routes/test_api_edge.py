@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 import re
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sending import Api
 
 from headimpact_service.errors import PROBLEMS
+from headimpact_service.middleware import Edge
 from headimpact_service.pages.docs import ASSETS
 from headimpact_service.store.uploads import Uploads
 
@@ -107,3 +111,29 @@ class TestPages:
 def test_answers_about_people_are_not_for_caches(api: Api) -> None:
     assert api.get("/v1/me").headers["cache-control"] == "no-store"
     assert api.get("/v1/nothing").headers["cache-control"] == "no-store"
+
+
+def test_a_request_that_the_server_cuts_off_is_answered_as_one_that_may_be_sent_again() -> None:
+    """As a server does that is told to stop, once it has waited for what is under way."""
+    sent: list[Any] = []
+
+    async def stalled(*_: Any) -> None:
+        await asyncio.sleep(60)
+
+    async def keep(message: Any) -> None:
+        sent.append(message)
+
+    async def cut_off() -> None:
+        scope = {"type": "http", "method": "POST", "path": "/v1/score", "headers": [], "query_string": b""}
+        request = asyncio.ensure_future(Edge(stalled)(scope, stalled, keep))
+        await asyncio.sleep(0)
+        request.cancel()
+        await request
+
+    asyncio.run(cut_off())
+    start, body = sent
+    headers = dict(start["headers"])
+    assert start["status"] == 503
+    assert headers[b"content-type"] == b"application/problem+json"
+    assert {b"retry-after", b"x-request-id"} <= headers.keys()
+    assert json.loads(body["body"])["detail"] == "The service is shutting down."
