@@ -26,7 +26,7 @@ def how_filled(values: FloatArray, index: int) -> str:
     if short_runs(unknown)[index]:
         return f": {FILLED}"
     if unknown.all():
-        return ": it holds nothing at all; three axes are needed, unless constrained_plane says which of them are zero"
+        return ": it holds nothing at all; three axes are needed, so write zeros where the motion has none by its plane"
     at_edge = unknown[: index + 1].all() or unknown[index:].all()
     return ": leave out the samples at the record's edge that lack it" if at_edge else ""
 
