@@ -5,11 +5,17 @@ No axis can be told from AP, 1 or forward, so nobody can read them without a map
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 
+from headimpact.quality import QualityNote, words
 from headimpact.recording import AXES, SIGNALS, SignalName
-from headimpact_service.ingest.headings import Headings
+from headimpact_service.errors import Problem
+from headimpact_service.ingest.headings import Headings, layout_problem
+from headimpact_service.ingest.layout import Layout
+from headimpact_service.ingest.no_signal import MAX_SHOWN
+from headimpact_service.ingest.presets import spoken_of
 from headimpact_service.ingest.spelling import unit_ending, unit_spelled
 from headimpact_service.ingest.table import Table
 
@@ -53,7 +59,38 @@ _NO_SAMPLES = frozenset(
 """Words of what is said of a signal once, or of another quantity."""
 
 
-def seeming_signals(headings: Headings, table: Table, read: Collection[int]) -> dict[SignalName, list[str]]:
+def left_signals(layout: Layout, headings: Headings, table: Table) -> dict[SignalName, list[str]]:
+    """Of each signal that a layout does not read, the columns that seem to be it; none of those that are read."""
+    read = set(layout.numbers)
+    named = {
+        signal: columns
+        for signal, columns in spoken_of(headings).items()
+        if read.isdisjoint(headings.find([column]) for column in columns)
+    }
+    found = _seeming(headings, table, read) | named
+    return {signal: columns for signal, columns in found.items() if signal not in layout.signals}
+
+
+def not_read(signal: SignalName, columns: Sequence[str]) -> Problem:
+    """The 422 for columns that seem to be a signal, of which nobody has said how to read them."""
+    return layout_problem(
+        f"The columns {', '.join(columns[:MAX_SHOWN])} seem to be the {words(signal)}, on axes, in a unit or for a "
+        "device that is not known: name the columns of every signal, and their units, in a mapping.",
+        code="columns-not-read",
+        pointer=f"/{signal}",
+    )
+
+
+def not_named(signal: SignalName, columns: Sequence[str]) -> QualityNote:
+    """The note on columns that seem to be a signal beside those that a mapping names."""
+    detail = (
+        f"The columns {', '.join(columns[:MAX_SHOWN])} seem to be the {words(signal)}, of which the mapping names "
+        f"none: they were not read. Name them in it too, or say {json.dumps({signal: None})}."
+    )
+    return QualityNote("channel_missing", "warning", detail, signal)
+
+
+def _seeming(headings: Headings, table: Table, read: Collection[int]) -> dict[SignalName, list[str]]:
     """Of each signal, three or more columns with samples that are not read and speak of it."""
     found: dict[SignalName, list[str]] = {}
     for column, heading in enumerate(headings.written):

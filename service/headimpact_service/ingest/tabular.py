@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 
-from headimpact.quality import QualityNote, words
+from headimpact.quality import words
 from headimpact.recording import SIGNALS, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.beside import with_axis_peaks, with_other_times, with_supplied, with_unread
@@ -17,7 +16,7 @@ from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.laying_out import lay_out
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.mapping import Mapping, merge
-from headimpact_service.ingest.no_signal import MAX_SHOWN, is_no_signal, with_remedies
+from headimpact_service.ingest.no_signal import is_no_signal, with_remedies
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.presets import (
@@ -27,11 +26,10 @@ from headimpact_service.ingest.presets import (
     preset_named,
     recognise,
     signals_of_presets,
-    spoken_of,
 )
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.seeming import seeming_signals
+from headimpact_service.ingest.seeming import left_signals, not_named, not_read
 from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.table_impact import TableImpact
 from headimpact_service.ingest.time_headings import speaks_of_times
@@ -171,40 +169,16 @@ def _require_sensor(mapping: Mapping) -> None:
 
 def _require_read(layout: Layout, headings: Headings, options: ImportOptions, table: Table) -> Layout:
     """Refuse columns that seem to be a signal and would not be read; where a mapping says which are, note them."""
-    read = set(layout.numbers)
-    seeming = {
-        signal: columns
-        for signal, columns in spoken_of(headings).items()
-        if read.isdisjoint(headings.find([column]) for column in columns)
-    }
-    found = seeming_signals(headings, table, read) | seeming
-    left = {signal: columns for signal, columns in found.items() if signal not in layout.signals}
+    left = left_signals(layout, headings, table)
     if options.mapping is None or not _names_signals(options.mapping):
         for signal, columns in left.items():
-            raise layout_problem(
-                f"The columns {', '.join(columns[:MAX_SHOWN])} seem to be the {words(signal)}, on axes, in a unit or "
-                "for a device that is not known: name the columns of every signal, and their units, in a mapping.",
-                code="columns-not-read",
-                pointer=f"/{signal}",
-            )
+            raise not_read(signal, columns)
         return layout
-    notes = tuple(
-        QualityNote(
-            "channel_missing",
-            "warning",
-            f"The columns {', '.join(columns[:MAX_SHOWN])} seem to be the {words(signal)}, of which the mapping names "
-            f"none: they were not read. Name them in it too, or say {json.dumps({signal: None})}.",
-            signal,
-        )
-        for signal, columns in left.items()
-        if not _is_null(options.mapping, signal) and not (signal == "angular_acceleration" and _turns(layout))
-    )
-    return replace(layout, notes=notes)
-
-
-def _turns(layout: Layout) -> bool:
-    """Whether the angular velocity is read, of which the acceleration is the derivative."""
-    return "angular_velocity" in layout.signals
+    # an angular acceleration beside a velocity that is read would only be its derivative
+    derived = {"angular_acceleration"} if "angular_velocity" in layout.signals else set[str]()
+    said = {*derived, *(name for name in SIGNALS if _is_null(options.mapping, name))}
+    notes = [not_named(signal, columns) for signal, columns in left.items() if signal not in said]
+    return replace(layout, notes=tuple(notes))
 
 
 def _is_null(mapping: Mapping, name: SignalName) -> bool:
