@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from headimpact.kinematics import Motion
 from headimpact.published import QUALITY_LIMITS
-from headimpact.recording import CRITERIA_UNITS
+from headimpact.recording import UNITS_OF
 
 FloatArray = NDArray[np.float64]
 Severity = Literal["note", "warning"]
@@ -110,7 +110,7 @@ def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: 
 
 def _extreme_values(channels: Sequence[Channel], peaks: FloatArray) -> Iterator[QualityNote]:
     for channel, peak in zip(channels, peaks.tolist(), strict=True):
-        bound, unit = QUALITY_LIMITS[channel.signal]["extreme"], CRITERIA_UNITS[channel.signal]
+        bound, unit = QUALITY_LIMITS[channel.signal]["extreme"], UNITS_OF[channel.signal][0]
         if peak > highest_of(channel.signal, "extreme"):
             yield _warning(
                 "extreme_value",

@@ -15,14 +15,8 @@ from headimpact.gaps import fill_gaps
 from headimpact.kinematics import FloatArray
 from headimpact.published import QUALITY_LIMITS
 from headimpact.quality import AXES, highest_of, words
-from headimpact.recording import TO_CRITERIA_UNIT, Recording, Signal, SignalName
+from headimpact.recording import TO_CRITERIA_UNIT, UNITS_OF, Recording, Signal, SignalName
 from headimpact.stamps import is_like, may_be_rounded, rate_said
-
-UNITS_OF: dict[str, tuple[str, str]] = {
-    "linear_acceleration": ("g", "m/s^2"),
-    "angular_velocity": ("rad/s", "deg/s"),
-    "angular_acceleration": ("rad/s^2", "deg/s^2"),
-}
 
 
 def require_form(signals: list[tuple[SignalName, Signal]]) -> None:

@@ -34,8 +34,12 @@ TO_CRITERIA_UNIT: dict[str, float] = {
     "deg/s^2": radians(1.0),
 }
 """What a unit of a signal is in the criteria's: g, rad/s and rad/s^2."""
-CRITERIA_UNITS: dict[str, str] = dict(zip(SIGNALS, ("g", "rad/s", "rad/s^2"), strict=True))
-"""The unit that criteria are computed in, of each signal."""
+UNITS_OF: dict[str, tuple[str, str]] = {
+    "linear_acceleration": ("g", "m/s^2"),
+    "angular_velocity": ("rad/s", "deg/s"),
+    "angular_acceleration": ("rad/s^2", "deg/s^2"),
+}
+"""The units that each signal may be in, the criteria's first."""
 
 ROTATION_TOLERANCE = 1e-3
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from headimpact.quality import words
-from headimpact.recording import SignalName
+from headimpact.recording import UNITS_OF, SignalName
 from headimpact_service.errors import PayloadError, Problem
-from headimpact_service.ingest.spelling import units_of
 
 
 def unit_unknown(named: str, signal: SignalName) -> Problem:
     """The 422 for a laboratory's channel in a unit that is none of its signal's."""
-    known = ", ".join(units_of(signal))
+    known = ", ".join(UNITS_OF[signal])
     detail = f"The unit of {named} is none that is known for it: write the {words(signal)} in one of {known}."
     return file_fault(detail, "unit-missing")
 

@@ -16,10 +16,9 @@ from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.no_signal import MAX_SHOWN
 from headimpact_service.ingest.presets import spoken_of
-from headimpact_service.ingest.spelling import unit_ending, unit_spelled
+from headimpact_service.ingest.spelling import unit_ending, unit_spelled, words_of
 from headimpact_service.ingest.table import Table
 
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _ACCELERATION = frozenset({"acc", "accel", "acceleration", "accelerometer", "beschleunigung", "lac"})
 _TURNING = frozenset({"ang", "angular", "rot", "rotational"})
 _VELOCITY = frozenset({"vel", "velocity", "rate", "speed"})
@@ -104,7 +103,7 @@ def _spoken_of(heading: str, beside: str | None) -> Iterator[SignalName]:
     if code := _CODE.fullmatch(heading):
         yield _CODED[code[1]]
         return
-    listed = [word.lower() for word in _WORD.findall(heading)]
+    listed = words_of(heading)
     words = set(listed)
     if words & _NO_SAMPLES:
         return

@@ -9,10 +9,16 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _NO_SIGN_OR_LETTER = re.compile(r"[^0-9a-z]+")
 _WORDED = str.maketrans({"°": "deg", "º": "deg", "µ": "u", "μ": "u", "ω": "omega", "α": "alpha"})
 MAX_COMPACT = 200
 _PRESET = files("headimpact_service.ingest") / "presets" / "generic_six_axis.toml"
+
+
+def words_of(heading: str) -> list[str]:
+    """The words of a heading in small letters, whatever parts them: punctuation, numbers or a capital."""
+    return [word.lower() for word in _WORD.findall(heading)]
 
 
 def compact(heading: str) -> str:
@@ -42,11 +48,6 @@ def _units() -> dict[str, dict[str, str]]:
 def known_units() -> frozenset[str]:
     """Every spelling of a unit of time or of a signal, as :func:`compact` has it."""
     return frozenset(spelling for spellings in _units().values() for spelling in spellings)
-
-
-def units_of(signal: str) -> list[str]:
-    """The units that a signal may be in."""
-    return list(vocabulary()[signal]["units"])
 
 
 def unit_spelled(signal: str, text: str | None) -> str | None:

@@ -6,9 +6,8 @@ import re
 
 from headimpact.recording import SignalName
 from headimpact_service.ingest.mapping import TIME_UNITS
-from headimpact_service.ingest.spelling import unit_ending, unit_spelled
+from headimpact_service.ingest.spelling import unit_ending, unit_spelled, words_of
 
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _TIMES = frozenset({"t", "time", "times", "stamp", "timestamp", "timestamps", "elapsed", "zeit", "temps", "tiempo"})
 _TIME_OF_ONE = re.compile(r"t[a-z]|[a-z]*time[a-z]*")
 """A word such as `tg` or `gyrotime`."""
@@ -98,7 +97,7 @@ def period_of_samples(heading: str, beside: str | None) -> float | None:
 def unit_of_times(heading: str, beside: str | None) -> str | None:
     """The unit of time that a heading names, or that stands beside it."""
     words = _words(heading)
-    inside = next((word for word in _listed(heading) if word in _INSIDE), None)
+    inside = next((word for word in words_of(heading) if word in _INSIDE), None)
     at_end = None if words & _OF_SIGNALS - {"x", "y"} else unit_ending("time", heading)
     return unit_spelled("time", beside) or at_end or unit_spelled("time", inside)
 
@@ -128,8 +127,4 @@ def hertz_of_rates(heading: str, beside: str | None, *, fs_is_rate: bool) -> flo
 
 
 def _words(heading: str) -> set[str]:
-    return set(_listed(heading))
-
-
-def _listed(heading: str) -> list[str]:
-    return [word.lower() for word in _WORD.findall(heading)]
+    return set(words_of(heading))

@@ -20,9 +20,9 @@ from headimpact_service.ingest.blocks import STAY
 from headimpact_service.ingest.cells import is_written_number, numbers_said, said
 from headimpact_service.ingest.date_order import DateOrder, year_first
 from headimpact_service.ingest.impact_json import MIN_RATE_HZ
+from headimpact_service.ingest.spelling import words_of
 from headimpact_service.ingest.times import TimeError, instant
 
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|#")
 _NAMES = frozenset(
     {
         *("impact", "event", "hit", "trial", "test", "run", "shot", "drop", "session", "record", "recording"),
@@ -51,7 +51,8 @@ _STATES = frozenset({"is", "flag", "state", "status", "error", "phase", "stage",
 _TRIGGERS = frozenset({"trigger", "triggered", "active"})
 _MARKS = _STATES | _TRIGGERS
 """Words of what comes and goes within an impact: an event's flag."""
-_COUNTS = frozenset({"#", "count"})
+_NUMBER_SIGN = "#"
+_COUNTS = frozenset({_NUMBER_SIGN, "count"})
 """Words that, like names, make a trigger one that is counted."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
@@ -118,7 +119,7 @@ def unread_columns(
     telling = _NAMES | _PARTS if alone else _NAMES if keyed and not named else _PERSONS
     found: dict[str, list[int]] = {}
     for column, heading in enumerate(headings):
-        words = {word.lower() for word in _WORD.findall(heading)}
+        words = {*words_of(heading), *(_NUMBER_SIGN if _NUMBER_SIGN in heading else "")}
         if column in passed or (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
             continue
         if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks", "triggers", "measured"}:

@@ -5,24 +5,15 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import pytest
-from sqlalchemy import Connection, text
+from named_rows import names, store
+from sqlalchemy import Connection
 
 from headimpact_service.errors import Problem
 from headimpact_service.store import organisations
 from headimpact_service.store.database import Database
-
-
-def names(database: Database) -> list[str]:
-    with database.read() as conn:
-        return list(conn.execute(text("SELECT name FROM organisations ORDER BY id")).scalars())
-
-
-def store(name: str) -> Callable[[Connection], bytes]:
-    return lambda conn: organisations.ensure(conn, name).id
 
 
 def transaction(conn: Connection) -> Any:

@@ -8,22 +8,14 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from sqlalchemy import Connection, create_engine, text
+from named_rows import names, store
+from sqlalchemy import Connection, create_engine
 from sqlalchemy.exc import OperationalError
 
 from headimpact_service.errors import Problem
 from headimpact_service.store import organisations
 from headimpact_service.store.database import Database
 from headimpact_service.store.postgresql import WRITE_LOCK
-
-
-def names(database: Database) -> list[str]:
-    with database.read() as conn:
-        return list(conn.execute(text("SELECT name FROM organisations ORDER BY id")).scalars())
-
-
-def store(name: str) -> Callable[[Connection], bytes]:
-    return lambda conn: organisations.ensure(conn, name).id
 
 
 class Gate:
