@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from headimpact_service.ingest.cells import Words, number_text
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, are_dated
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
+from headimpact_service.ingest.guarded.nested_columns import Batches, laid_out
 from headimpact_service.ingest.table import Columns, FloatArray
 
 MICROSECONDS = "us"
@@ -22,9 +23,6 @@ MAX_LIST = 20_001
 """Of a longer list this much is read: one sample more than an impact may have, which is then refused by name."""
 _NO_TEXT = "A column that is to be read as text holds something else."
 _EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
-
-Batches = Callable[[list[int]], Iterator[pa.RecordBatch]]
-"""Reads the columns of these places, in their order, batch by batch."""
 
 
 def is_number(kind: pa.DataType) -> bool:
@@ -49,6 +47,7 @@ class ArrowTable:
 
     def __init__(self, schema: pa.Schema, batches: Batches) -> None:
         """Look at the schema, and for times that are text at the first rows."""
+        schema, batches = laid_out(schema, batches)
         self.headings = checked_headings(schema.names)
         self._types = list(schema.types)
         self._batches = batches

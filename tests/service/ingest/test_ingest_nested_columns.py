@@ -1,0 +1,141 @@
+"""Parquet and Arrow columns of structs and of lists within lists, laid out as columns of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from binary_files import arrow, noise, parquet
+from ingest_files import read, refused
+
+from headimpact_service.ingest.mapping import Mapping
+from headimpact_service.ingest.record import ImpactRecord
+
+IMPACTS, SAMPLES = 3, 40
+NAMES = ("acc_g", "gyro_rad_s")
+
+
+def vectors() -> list[np.ndarray]:
+    """Acceleration and angular velocity, each impacts x samples x 3."""
+    values = noise(IMPACTS, SAMPLES)
+    return [values[..., :3], values[..., 3:]]
+
+
+def by_axis(samples: np.ndarray) -> dict[str, Any]:
+    return {axis: samples[..., place].tolist() for place, axis in enumerate("xyz")}
+
+
+def of_impacts(cell: Callable[[np.ndarray], Any]) -> dict[str, Any]:
+    """A row an impact: a cell of each signal, from samples x 3."""
+    columns = zip(NAMES, vectors(), strict=True)
+    return {"external_id": ["i0", "i1", "i2"]} | {name: [cell(one) for one in values] for name, values in columns}
+
+
+def of_samples(cell: Callable[[np.ndarray], Any], kind: pa.DataType) -> dict[str, Any]:
+    """A row a sample: a cell of each signal, from 3 components."""
+    columns = zip(NAMES, vectors(), strict=True)
+    return {
+        "external_id": np.repeat(["i0", "i1", "i2"], SAMPLES),
+        "t_ms": np.tile(np.arange(SAMPLES) * 1.0, IMPACTS),
+    } | {name: pa.array([cell(row) for row in values.reshape(-1, 3)], kind) for name, values in columns}
+
+
+POINT = pa.struct([(axis, pa.float64()) for axis in "xyz"])
+SHAPES: dict[str, dict[str, Any]] = {
+    "lists of triples": of_impacts(np.ndarray.tolist),
+    "lists of structs": of_impacts(lambda one: [by_axis(row) for row in one]),
+    "structs of lists": of_impacts(by_axis),
+    "three lists in one": of_impacts(lambda one: one.T.tolist()),
+    "structs within structs": of_impacts(lambda one: {"of": by_axis(one)}),
+    "a struct a sample": of_samples(by_axis, POINT),
+    "a vector a sample": of_samples(np.ndarray.tolist, pa.list_(pa.float64(), 3)),
+}
+MAPPING = {
+    name: {"unit": unit} | {axis: f"{column}_of_{axis}" for axis in "xyz"}
+    for name, unit, column in (
+        ("linear_acceleration", "g", NAMES[0]),
+        ("angular_velocity", "rad/s", NAMES[1]),
+    )
+} | {"external_id": "external_id"}
+
+
+@pytest.mark.parametrize(
+    "write", [parquet, lambda table: parquet(table, row_group_size=7), arrow], ids=["parquet", "row groups", "arrow"]
+)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_samples_come_back_to_the_last_bit(write: Callable[[pa.Table], bytes], shape: str):
+    options: dict[str, Any] = {} if "sample" in shape else {"sample_rate_hz": 1000.0}
+    if "within" in shape:
+        options["mapping"] = Mapping.model_validate(MAPPING)
+    found = read(write(pa.table(SHAPES[shape])), **options)
+    assert len(found) == IMPACTS
+    for number, record in enumerate(found):
+        assert isinstance(record, ImpactRecord), record.as_dict()
+        assert record.external_id == f"i{number}"
+        signals = [signal for _, signal in record.recording.signals()]
+        assert [(signal.unit, signal.sample_rate_hz) for signal in signals] == [("g", 1000.0), ("rad/s", 1000.0)]
+        for signal, sent in zip(signals, vectors(), strict=True):
+            np.testing.assert_array_equal(signal.values, sent[number])
+
+
+def test_six_axes_in_one_list_are_numbered_for_a_mapping():
+    table = pa.table({"imu": list(noise(2).tolist())})
+    mapping = {
+        "linear_acceleration": {"unit": "g", "x": "imu_1", "y": "imu_2", "z": "imu_3"},
+        "angular_velocity": {"unit": "rad/s", "x": "imu_4", "y": "imu_5", "z": "imu_6"},
+        "sample_rate_hz": 1000.0,
+    }
+    [first, _] = read(parquet(table), mapping=Mapping.model_validate(mapping))
+    assert isinstance(first, ImpactRecord)
+    np.testing.assert_array_equal(np.hstack([signal.values for _, signal in first.recording.signals()]), noise(2)[0])
+
+
+def test_a_signal_that_an_impact_lacks_is_null():
+    acceleration, velocity = (values.tolist() for values in vectors())
+    table = pa.table({NAMES[0]: acceleration, NAMES[1]: [velocity[0], None, velocity[2]]})
+    found = read(parquet(table), sample_rate_hz=1000.0)
+    lengths = [len(record.recording.signals()) for record in found if isinstance(record, ImpactRecord)]
+    assert lengths == [2, 1, 2]
+
+
+def test_the_unit_of_a_column_holds_for_its_parts():
+    kind = pa.list_(pa.list_(pa.float64()))
+    fields = [
+        pa.field("linear_acceleration", kind, metadata={"unit": "m/s^2"}),
+        pa.field("angular_velocity", kind, metadata={"unit": "deg/s"}),
+    ]
+    columns = [pa.array(values.tolist(), kind) for values in vectors()]
+    [first, *_] = read(parquet(pa.table(columns, schema=pa.schema(fields))), sample_rate_hz=1000.0)
+    assert isinstance(first, ImpactRecord)
+    assert [signal.unit for _, signal in first.recording.signals()] == ["m/s^2", "deg/s"]
+
+
+@pytest.mark.parametrize("ragged", [[1.0, 2.0], [1.0, 2.0, 3.0, 4.0], []])
+def test_vectors_of_unlike_lengths_are_refused_by_name(ragged: list[float]):
+    cells = vectors()[0].tolist()
+    cells[1][7] = ragged
+    problem = refused(parquet(pa.table({NAMES[0]: cells})), sample_rate_hz=1000.0)
+    assert problem.slug == "unreadable-file"
+    assert problem.detail == "The lists within acc_g differ in length: the first has 3 components."
+
+
+def test_a_vector_that_is_missing_is_a_missing_sample():
+    cells = vectors()[0].tolist()
+    cells[0][7] = None
+    bad, *_ = read(parquet(pa.table({NAMES[0]: cells})), sample_rate_hz=1000.0)
+    assert not isinstance(bad, ImpactRecord)
+    assert [error.code for error in bad.errors] == ["missing-sample"]
+
+
+def test_thousands_of_parts_are_too_many_columns():
+    wide = pa.struct([(f"f{number}", pa.float32()) for number in range(2000)])
+    problem = refused(parquet(pa.table({"a": pa.array([None], wide)})))
+    assert "at most 1024 columns" in problem.detail
+
+
+def test_a_table_without_rows_is_laid_out_by_its_types():
+    empty = pa.table({NAMES[0]: pa.array([], pa.list_(pa.list_(pa.float64()))), NAMES[1]: pa.array([], POINT)})
+    assert refused(parquet(empty)).status == 422
