@@ -89,6 +89,29 @@ def not_named(signal: SignalName, columns: Sequence[str]) -> QualityNote:
     return QualityNote("channel_missing", "warning", detail, signal)
 
 
+def unnamed(layout: Layout, headings: Headings, table: Table) -> list[QualityNote]:
+    """The notes on three columns on axes x, y and z whose quantity nobody tells, where a layout lacks one of a head's."""
+    lacks_rotation = {"angular_velocity", "angular_acceleration"}.isdisjoint(layout.signals)
+    if "linear_acceleration" in layout.signals and not lacks_rotation:
+        return []
+    found: dict[tuple[str, ...], dict[str, str]] = {}
+    for column, heading in enumerate(headings.written):
+        listed = words_of(heading)
+        axes = [word for word in listed if word in AXES]
+        if len(axes) == 1 and column not in layout.numbers and table.has_samples(column):
+            alike = tuple("*" if word in AXES else word for word in listed)
+            found.setdefault(alike, {}).setdefault(axes[0], heading)
+    return [_unnamed(list(by_axis.values())) for by_axis in found.values() if len(by_axis) == len(AXES)]
+
+
+def _unnamed(columns: Sequence[str]) -> QualityNote:
+    detail = (
+        f"The columns {', '.join(columns)} have three axes and were not read: no quantity is known by that name. If they "
+        "are the head's motion, name the columns of every signal, and their units, in a mapping."
+    )
+    return QualityNote("channel_missing", "note", detail)
+
+
 def _seeming(headings: Headings, table: Table, read: Collection[int]) -> dict[SignalName, list[str]]:
     """Of each signal, three or more columns with samples that are not read and speak of it."""
     found: dict[SignalName, list[str]] = {}

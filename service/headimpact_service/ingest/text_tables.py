@@ -64,6 +64,13 @@ def _read_member(archive: GuardedZip, name: str, options: ImportOptions) -> list
         return [Problem(problem.slug, f"{name}: {problem.detail}", errors=problem.errors)]
 
 
+def tables_beside(names: list[str]) -> Iterator[Problem]:
+    """Of an archive that is a laboratory's test, the tables that are in it too: each is refused by name."""
+    for name in filter(_is_table, sorted(names)):
+        detail = f"{name} was not read: of an archive with a laboratory's test only this is. Send it alone."
+        yield Problem("unsupported-media-type", detail)
+
+
 def _is_about_it(name: str) -> bool:
     """Whether a file says something of the others: a licence, a page, a picture."""
     path = PurePosixPath(name.lower())

@@ -28,7 +28,7 @@ from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.source import Source
-from headimpact_service.ingest.text_tables import holds_tables, read_folder, read_text_table
+from headimpact_service.ingest.text_tables import holds_tables, read_folder, read_text_table, tables_beside
 from headimpact_service.ingest.zip_guard import GuardedZip
 
 Impacts = Iterator[ImpactRecord | Problem]
@@ -67,6 +67,8 @@ def _read_zip(source: Source, options: ImportOptions) -> Impacts:
         for fits, read in ARCHIVES:
             if fits(archive.names):
                 yield from read(archive, options)
+                if read is not read_folder:
+                    yield from tables_beside(archive.names)
                 return
         names = archive.names
     for fits, read_whole in ZIPPED:

@@ -409,6 +409,15 @@ def test_columns_that_seem_to_be_a_signal_are_never_passed_over(columns):
     assert record.recording.angular_velocity is None
 
 
+def test_three_axes_of_a_quantity_that_nobody_tells_are_noted_where_a_signal_is_missing():
+    gyroscope, head = "t_ms,wx_rad_s,wy_rad_s,wz_rad_s", "HEAD CG X,HEAD CG Y,HEAD CG Z"
+    [note] = one(table(f"{gyroscope},{head}")).notes
+    assert (note.code, note.severity) == ("channel_missing", "note")
+    assert "HEAD CG X, HEAD CG Y, HEAD CG Z have three axes and were not read" in note.detail
+    assert one(table(f"{gyroscope},ax_g,ay_g,az_g,{head}")).notes == ()
+    assert one(table(f"{gyroscope},HEAD CG X,HEAD CG Y")).notes == ()
+
+
 @pytest.mark.parametrize(
     ("columns", "signal"),
     [

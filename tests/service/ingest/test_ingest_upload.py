@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import gzip
+import io
+import zipfile
 
 import numpy as np
 import pytest
 from ingest_files import body, csv_text, encoded, one, outcome, read, refused, six_axis, statuses, zipped
+from laboratory import iso_mme
 from making import prevent
 
 from headimpact_service.errors import Problem
@@ -68,6 +71,17 @@ def test_a_kind_that_is_not_read_is_415_and_named(data: bytes, named: str):
 def test_a_zip_of_something_else_is_415():
     assert refused(zipped({"readme.txt": "hello"})).slug == "unsupported-media-type"
     assert refused(zipped({})).slug == "unsupported-media-type"
+
+
+def test_a_table_beside_a_laboratorys_test_is_not_passed_over():
+    table = csv_text(six_axis())
+    with zipfile.ZipFile(io.BytesIO(iso_mme())) as archive:
+        members: dict[str, str | bytes] = {name: archive.read(name) for name in archive.namelist()}
+    record, problem = read(zipped(members | {"helmet/gyro.csv": table, "report.pdf": b"%PDF"}))
+    assert isinstance(record, ImpactRecord)
+    assert isinstance(problem, Problem)
+    assert (problem.slug, "helmet/gyro.csv was not read" in problem.detail) == ("unsupported-media-type", True)
+    assert one(zipped({"gyro.csv": table})).recording.angular_velocity is not None
 
 
 def test_an_empty_file_is_refused():
