@@ -197,10 +197,11 @@ class Reading:
     def next(self) -> Frame:
         """What comes next; :class:`Problem` where the file is at fault."""
         frame = receive(self._worker.connection, self._deadline)
-        if frame.kind == "table_end":
+        if frame.kind in {"table_end", "table_refused"}:
             self._open = False
         if frame.kind == "refused":
             self._rest()
+        if frame.kind in {"refused", "table_refused"}:
             with _well_formed():
                 problem = Problem(frame.fields["slug"], str(frame.fields["detail"]))
             raise problem

@@ -114,6 +114,8 @@ def test_numbers_that_were_typed_as_text_are_numbers_and_words_are_not():
     rows[5][2] = " 1.5e0 "
     assert samples_of(records(xlsx({"a": rows}))[0])[4, 1] == 1.5
     rows[5][2] = "1,5"
+    assert samples_of(records(xlsx({"a": rows}))[0])[4, 1] == 1.5
+    rows[5][2] = "much"
     assert [error.code for error in refused(xlsx({"a": rows})).errors] == ["missing-sample"]
 
 
@@ -128,6 +130,15 @@ def test_a_broken_sheet_stands_for_itself_among_others():
     fault, good = read(xlsx({"long": long, "a": generic()}))
     assert isinstance(fault, Problem)
     assert "20000 samples" in fault.detail
+    assert isinstance(good, ImpactRecord)
+
+
+def test_a_sheet_that_is_refused_while_it_is_read_leaves_the_others_alone():
+    headings, *rows = generic()
+    long = [[*headings, "external_id"], *([*row, "x" * 1001] for row in rows)]
+    fault, good = read(xlsx({"long": long, "a": generic()}))
+    assert isinstance(fault, Problem)
+    assert fault.detail == "Sheet long: A cell of text may have at most 1000 characters."
     assert isinstance(good, ImpactRecord)
 
 
@@ -176,3 +187,29 @@ def test_a_row_of_units_below_the_headings_is_one():
     units = ["s", "g", "g", "g", "rad/s", "rad/s", "rad/s"]
     [record] = records(xlsx({"a": [["Event 1"], words, units, *rows]}))
     np.testing.assert_array_equal(samples_of(record), six_axis())
+
+
+def as_text(comma: str) -> list[Row]:
+    """The same with every number kept as text."""
+    headings, *rows = generic()
+    return [headings, *([f"{value:.7f}".replace(".", comma) for value in row] for row in rows)]
+
+
+def test_numbers_kept_as_text_may_have_decimal_commas():
+    [written] = records(xlsx({"a": as_text(",")}))
+    [plain] = records(xlsx({"a": as_text(".")}))
+    np.testing.assert_array_equal(samples_of(written), samples_of(plain))
+    assert [signal.sample_rate_hz for _, signal in written.recording.signals()] == [1000.0, 1000.0]
+
+
+def test_commas_beside_points_in_numbers_kept_as_text_are_refused():
+    rows = as_text(",")
+    rows[3][2] = "1.5"
+    assert "decimal commas, and points too" in refused(xlsx({"a": rows})).detail
+
+
+def test_commas_that_may_group_thousands_in_numbers_kept_as_text_are_refused():
+    headings, *rows = generic()
+    for row in rows:
+        row[1] = "1,250"
+    assert "is not clear" in refused(xlsx({"a": [headings, *rows]})).detail

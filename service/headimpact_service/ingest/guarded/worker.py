@@ -98,7 +98,7 @@ def answer(connection: socket.socket, reader: Reader, stream: io.BufferedIOBase)
     except WireError:
         raise
     except Problem as problem:
-        send(connection, Frame("refused", {"slug": problem.slug, "detail": problem.detail}))
+        send(connection, _refusal("refused", problem))
     except MemoryError:
         send(connection, Frame("exhausted"))
         return False
@@ -125,10 +125,20 @@ def _offer(connection: socket.socket, content: NamedTable) -> bool:
     wanted = receive(connection, Deadline(None))
     if wanted.kind != "read":
         return wanted.kind == "skip"
-    for block in table.blocks(wanted.fields["numbers"], wanted.fields["texts"]):
-        send(connection, _block(block))
-    send(connection, Frame("table_end"))
+    try:
+        for block in table.blocks(wanted.fields["numbers"], wanted.fields["texts"]):
+            send(connection, _block(block))
+    except Problem as problem:
+        if content.name is None:
+            raise
+        send(connection, _refusal("table_refused", problem))  # the others are read
+    else:
+        send(connection, Frame("table_end"))
     return True
+
+
+def _refusal(kind: str, problem: Problem) -> Frame:
+    return Frame(kind, {"slug": problem.slug, "detail": problem.detail})
 
 
 def _block(block: Columns) -> Frame:

@@ -19,6 +19,7 @@ from python_calamine import CalamineSheet, CalamineWorkbook, SheetTypeEnum
 
 from headimpact_service.ingest.cells import is_no_number, number_text, said
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
+from headimpact_service.ingest.decimal_commas import MIXED, UNCLEAR_COMMA, has_comma, has_decimal_comma
 from headimpact_service.ingest.guarded.contents import (
     Content,
     NamedTable,
@@ -121,6 +122,7 @@ class SheetTable:
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns."""
+        self._require_one_point(numbers)
         columns = {place: self._numbers(place) for place in numbers}
         words = {place: self._texts(place) for place in texts}
         for first in range(0, self._rows, ROWS_AT_ONCE):
@@ -130,6 +132,18 @@ class SheetTable:
                 numbers={place: values[rows] for place, values in columns.items()},
                 texts={place: cells[rows] for place, cells in words.items()},
             )
+
+    def _require_one_point(self, numbers: Sequence[int]) -> None:
+        """Refuse numbers kept as text whose commas may group thousands, or beside which others have points."""
+        places = (self._places[place] for place in numbers if place not in self.dated)
+        texts = {cell for block, column in places for cell in block.cells(column) if isinstance(cell, str)}
+        commas = set(filter(has_comma, texts))
+        if not commas:
+            return
+        if any("." in text and _NUMBER.fullmatch(text) for text in texts):
+            raise unreadable(MIXED)
+        if not any(map(has_decimal_comma, commas)):
+            raise unreadable(UNCLEAR_COMMA)
 
     def _numbers(self, place: int) -> FloatArray:
         block, column = self._places[place]
@@ -206,7 +220,7 @@ def _has_number(row: Sequence[Any]) -> bool:
 
 
 def _says_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
-    return _is_number(cell) or (isinstance(cell, str) and _NUMBER.fullmatch(cell) is not None)
+    return _is_number(cell) or (isinstance(cell, str) and (_NUMBER.fullmatch(cell) is not None or has_comma(cell)))
 
 
 def _is_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
@@ -216,8 +230,8 @@ def _is_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
 def _number(cell: Any) -> float:  # noqa: ANN401 - any cell
     if _is_number(cell):
         return float(cell)
-    if isinstance(cell, str) and _NUMBER.fullmatch(cell):
-        return float(cell)
+    if isinstance(cell, str) and _says_number(cell):
+        return float(cell.replace(",", "."))
     return float("nan" if cell is None or (isinstance(cell, str) and is_no_number(cell)) else "inf")
 
 
