@@ -90,7 +90,7 @@ def not_named(signal: SignalName, columns: Sequence[str]) -> QualityNote:
 
 
 def unnamed(layout: Layout, headings: Headings, table: Table) -> list[QualityNote]:
-    """The notes on three columns on axes x, y and z whose quantity nobody tells, where a layout lacks one of a head's."""
+    """The notes on three columns of x, y and z whose quantity nobody tells, where a layout lacks one of a head's."""
     lacks_rotation = {"angular_velocity", "angular_acceleration"}.isdisjoint(layout.signals)
     if "linear_acceleration" in layout.signals and not lacks_rotation:
         return []
@@ -106,8 +106,8 @@ def unnamed(layout: Layout, headings: Headings, table: Table) -> list[QualityNot
 
 def _unnamed(columns: Sequence[str]) -> QualityNote:
     detail = (
-        f"The columns {', '.join(columns)} have three axes and were not read: no quantity is known by that name. If they "
-        "are the head's motion, name the columns of every signal, and their units, in a mapping."
+        f"The columns {', '.join(columns)} have three axes and were not read: no quantity is known by that name. If "
+        "they are the head's motion, name the columns of every signal, and their units, in a mapping."
     )
     return QualityNote("channel_missing", "note", detail)
 

@@ -83,6 +83,53 @@ def test_times_with_their_dates_are_those_of_the_samples(write: Writer, sep: str
     np.testing.assert_array_equal(record.recording.linear_acceleration.values, six_axis()[:, :3])
 
 
+CLOCKS = ["%H:%M:%S.%f", "%I:%M:%S.%f %p", "%m/%d/%Y %I:%M:%S.%f %p", "%d.%m.%Y %H:%M:%S.%f", "%M:%S.%f"]
+NOON = dt.datetime(2026, 11, 20, 11, 59, 59, 990_000, dt.UTC)
+"""So that the half of the day changes within an impact."""
+
+
+def clock(form: str, rate_hz: float = 2000.0, first: dt.datetime = NOON) -> list[str]:
+    """Times of the usual samples as a clock shows them."""
+    return [(first + dt.timedelta(microseconds=sample * 1e6 / rate_hz)).strftime(form) for sample in range(SAMPLES)]
+
+
+@every_table
+@pytest.mark.parametrize("form", CLOCKS[:-1])
+def test_times_of_day_are_those_of_the_samples(write: Writer, form: str):
+    record = one(write(columns(clock(form))))
+    assert (rate_of(record), record.occurred_at, record.recording.pre_trigger_ms) == (2000.0, None, None)
+
+
+def test_minutes_and_seconds_are_those_of_the_samples():
+    assert rate_of(one(csv(columns(clock("%M:%S.%f", first=NOON.replace(second=3)))))) == 2000.0
+
+
+def test_thousandths_may_stand_behind_a_colon():
+    times = [f"13:04:05:{sample:03}" for sample in range(SAMPLES)]
+    assert rate_of(one(csv(columns(times)))) == 1000.0
+
+
+def test_an_impact_may_go_on_behind_midnight_where_days_are_written():
+    first = dt.datetime(2026, 11, 20, 23, 59, 59, 990_000, dt.UTC)
+    assert rate_of(one(csv(columns(clock("%d.%m.%Y %H:%M:%S.%f", first=first))))) == 2000.0
+    assert codes(refused(csv(columns(clock("%H:%M:%S.%f", first=first))))) == [(None, "several-impacts")]
+
+
+@every_table
+@pytest.mark.parametrize("form", CLOCKS)
+def test_a_time_of_day_that_stays_is_the_impact_s(write: Writer, form: str):
+    assert rate_of(one(write(columns(clock(form)[:1] * SAMPLES)), sample_rate_hz=1000.0)) == 1000.0
+
+
+@pytest.mark.parametrize(
+    "cell", ["24:00:00.001", "13:61:00.001", "13:04:60.001", "13:04:05.001 PM", "20.11.2026 04:05.001"]
+)
+def test_what_no_clock_shows_is_no_time(cell: str):
+    times = clock("%H:%M:%S.%f")
+    times[20] = cell
+    assert codes(refused(csv(columns(times)))) == [(None, "missing-sample")]
+
+
 @every_table
 def test_they_are_read_as_a_column_of_parquet_s_own_type_is(write: Writer):
     written = one(write(columns(stamps(3200.0, digits=6))))

@@ -199,7 +199,7 @@ def _word(cell: Any) -> str:  # noqa: ANN401 - any cell
 
 def _time(cell: Any) -> str:  # noqa: ANN401 - any cell
     """A cell that may be a time, as text."""
-    return cell.isoformat() if isinstance(cell, dt.datetime) else _word(cell)
+    return cell.isoformat() if isinstance(cell, dt.datetime | dt.time) else _word(cell)
 
 
 def _holds_nothing(row: Row) -> bool:
