@@ -23,6 +23,8 @@ _CLOCK = re.compile(
 """A time of day, with a date or without; without hours, minutes and seconds as a spreadsheet shows them."""
 _FRACTION = re.compile(r":[0-9]{2}(?:[.,][0-9]|:[0-9]{3})", re.ASCII)
 _DAY_S = 86_400
+MAX_DAYS = 4000
+"""Of one file: eleven years of them."""
 
 
 def dated_columns(columns: Iterable[Sequence[str]]) -> frozenset[int]:
@@ -71,6 +73,8 @@ class Elapsed:
         found = _CLOCK.fullmatch(text)
         seconds = None if found is None else _seconds(found)
         if found is None or seconds is None:
+            return None
+        if len(self._days) > MAX_DAYS:
             return None
         day = self._days.setdefault(found["date"], len(self._days))
         parts = found["parts"] or found["thousandths"] or ""

@@ -15,6 +15,7 @@ from ingest_files import codes, one, read, refused, six_axis
 
 from headimpact.errors import TraceError
 from headimpact.preparation import prepare
+from headimpact_service.ingest.dated import MAX_DAYS, Elapsed
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 
@@ -113,6 +114,12 @@ def test_an_impact_may_go_on_behind_midnight_where_days_are_written():
     first = dt.datetime(2026, 11, 20, 23, 59, 59, 990_000, dt.UTC)
     assert rate_of(one(csv(columns(clock("%d.%m.%Y %H:%M:%S.%f", first=first))))) == 2000.0
     assert codes(refused(csv(columns(clock("%H:%M:%S.%f", first=first))))) == [(None, "several-impacts")]
+
+
+def test_a_file_has_so_many_days_at_most():
+    elapsed = Elapsed()
+    days = [f"1/1/{year} 1:00:00.5" for year in range(MAX_DAYS + 2)]
+    assert [np.isfinite(elapsed.microseconds(day)) for day in days] == [True] * (MAX_DAYS + 1) + [False]
 
 
 @every_table
