@@ -69,7 +69,8 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: fr
     if name not in required and all(component is None for component in components.values()):
         return None
     given = [axis for axis, component in components.items() if component is not None]
-    turned = mapping.location == "sensor" or bool((mapping.reading or {}).get("mounting"))
+    mounted = (mapping.reading or {}).get("mounting")
+    turned = mapping.location == "sensor" or (mounted is not None and headings.find(mounted) is not None)
     for axis in missing_axes(name, given, mapping.constrained_plane, turned=turned):
         raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)

@@ -26,12 +26,21 @@ def is_no_signal(problem: Problem) -> bool:
     return any(error.code == CODE for error in problem.errors)
 
 
-def with_remedies(headings: Sequence[str], options: ImportOptions, format_name: str) -> Problem:
-    """The same with what helps in this sort of file."""
+def with_remedies(
+    headings: Sequence[str], options: ImportOptions, format_name: str, single_axes: Sequence[str]
+) -> Problem:
+    """The same with what helps in this sort of file; `single_axes` are columns of signals that are not whole."""
     named = "" if options.preset is None else f" of the preset {options.preset}"
     remedy = "name a preset, or send a mapping" if options.preset is None else "send a mapping"
     if format_name == "csv" and any(headings) and all(map(is_written_number, filter(None, headings))):
         return layout_problem("The file begins with numbers: write headings above its columns.", code=CODE)
+    if single_axes:
+        return layout_problem(
+            f"No signal has its three axes; the columns {', '.join(single_axes[:MAX_SHOWN])} are some of them. If the "
+            'motion was in one plane of the head, say which in a mapping, as {"constrained_plane": "sagittal"}; else '
+            "name the columns of the other axes in it.",
+            code=CODE,
+        )
     asked = f"The columns of no signal{named} were found: {remedy} from columns to signals"
     if format_name == "mat":
         asked += (

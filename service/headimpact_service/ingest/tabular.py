@@ -23,9 +23,11 @@ from headimpact_service.ingest.presets import (
     Preset,
     beside_signals,
     fitting,
+    generic,
     preset_named,
     recognise,
     signals_of_presets,
+    single_axes,
 )
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
@@ -127,7 +129,9 @@ def _preset(headings: Headings, options: ImportOptions) -> Preset | None:
         return preset
     if options.mapping is not None and _names_signals(options.mapping):
         return None
-    return recognise(headings)
+    found = recognise(headings)
+    is_planar = options.mapping is not None and options.mapping.constrained_plane is not None
+    return generic() if found is None and is_planar else found  # of which no signal needs to be whole
 
 
 def _names_signals(mapping: Mapping) -> bool:
@@ -148,7 +152,9 @@ def _laid_out(plan: Plan, headings: Headings) -> Layout:
     try:
         return lay_out(plan.mapping, headings, plan.required)
     except Problem as found:
-        problem = with_remedies(headings.written, plan.options, plan.format) if is_no_signal(found) else found
+        problem = found
+        if is_no_signal(found):
+            problem = with_remedies(headings.written, plan.options, plan.format, single_axes(headings))
         names = [] if plan.options.preset is not None else fitting(headings, but=plan.preset)
         if not names:
             raise problem from None

@@ -144,6 +144,19 @@ def test_a_heading_as_written_wins_over_a_looser_match():
     assert peaks(record.recording.linear_acceleration) == [2.0, -3.0, 4.0]
 
 
+def test_a_plane_alone_makes_headings_of_single_axes_known():
+    text = table("t_ms,ax_g,az_g,wy_rad_s")
+    problem = refused(text)
+    assert codes(problem) == [("mapping", "layout-unknown")]
+    assert "the columns ax_g, az_g, wy_rad_s are some of them" in problem.detail
+    assert '{"constrained_plane": "sagittal"}' in problem.detail
+    recording = one(text, mapping=mapping({"constrained_plane": "sagittal"})).recording
+    assert peaks(recording.linear_acceleration) == [1.0, 0.0, 2.0]
+    assert peaks(recording.angular_velocity) == [0.0, 3.0, 0.0]
+    other = refused(text, mapping=mapping({"constrained_plane": "coronal"}))
+    assert codes(other) == [("/linear_acceleration/y", "column-missing")]
+
+
 def test_a_constrained_plane_needs_only_its_own_columns():
     document = {
         "angular_velocity": {"unit": "rad/s", "y": "front"},

@@ -232,7 +232,7 @@ def test_blocks_and_batches_make_no_difference(tmp_path: Path):
         (pa.table({"a": [1.0]}), "The columns of no signal were found"),
         (wide(noise(0)), "no samples"),
         (nested(noise(1)).slice(1), "no samples"),
-        (pa.table({"linear_acceleration": pa.array([], pa.struct([("x", pa.float64())]))}), "no signal"),
+        (pa.table({"linear_acceleration": pa.array([], pa.struct([("x", pa.float64())]))}), "No signal"),
         (wide(noise(1)).append_column("ax_g", pa.array([0.0] * 40)), "same heading"),
         (wide(noise(1)).set_column(2, "ax_g", pa.array(["word"] * 40)), "holds no numbers"),
         (pa.table({f"c{i}": [0.0] for i in range(1025)}), "1024 columns"),

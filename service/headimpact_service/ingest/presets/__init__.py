@@ -79,14 +79,14 @@ def _with_names(mapping: Mapping, headings: Headings) -> Mapping:
 
     Whoever joins a device's files into one table adds them.
     """
-    generic = _generic().mapping
+    of_any = generic().mapping
     fields = ("external_id", "athlete", "device", "session_id", "occurred_at")
-    added: dict[str, Any] = {name: getattr(generic, name) for name in fields if getattr(mapping, name) is None}
+    added: dict[str, Any] = {name: getattr(of_any, name) for name in fields if getattr(mapping, name) is None}
     if not mapping.group_by:
-        added["group_by"] = generic.group_by
-    if not _has_times(mapping, headings) and (times := _vocabulary(_generic().name).time(headings)):
+        added["group_by"] = of_any.group_by
+    if not _has_times(mapping, headings) and (times := _vocabulary(generic().name).time(headings)):
         added["time"] = times
-    spellings = (generic.reading or {}).items()
+    spellings = (of_any.reading or {}).items()
     reading = {name: spelled for name, spelled in spellings if spelled and headings.find(spelled) is not None}
     if reading:
         added["reading"] = reading | (mapping.reading or {})
@@ -117,12 +117,8 @@ def _in_unit(name: SignalName, columns: SignalColumns, headings: Headings) -> Si
 @cache
 def _spoken_units() -> dict[SignalName, dict[str, list[str]]]:
     """How headings spell each signal's units."""
-    words = _generic().vocabulary or {}
+    words = generic().vocabulary or {}
     return {name: words[name]["units"] for name in SIGNALS}
-
-
-def _generic() -> Preset:
-    return next(preset for preset in presets().values() if preset.vocabulary is not None)
 
 
 def beside_signals(headings: Headings) -> Mapping:
@@ -132,17 +128,17 @@ def beside_signals(headings: Headings) -> Mapping:
 
 def spoken_of(headings: Headings) -> dict[SignalName, list[str]]:
     """The columns that seem to be those of a signal, whatever layout they are read by."""
-    return _vocabulary(_generic().name).components(headings)
+    return _vocabulary(generic().name).components(headings)
 
 
 def keys_of(headings: Headings) -> list[int]:
     """The columns that tell impacts apart wherever no layout says which do."""
-    return [column for spelled in _generic().mapping.group_by or () if (column := headings.find(spelled)) is not None]
+    return [column for spelled in generic().mapping.group_by or () if (column := headings.find(spelled)) is not None]
 
 
 def times_of(headings: Headings) -> set[int]:
     """The columns whose headings are words for the samples' times, whatever layout they are read by."""
-    vocabulary = _vocabulary(_generic().name)
+    vocabulary = _vocabulary(generic().name)
     return {column for column, said in enumerate(headings.spoken) if vocabulary.says_time(said)}
 
 
@@ -181,6 +177,17 @@ def recognise(headings: Headings) -> Preset | None:
     """The preset that a table's headings are of."""
     candidates = (preset for preset in presets().values() if preset.recognised and preset.format == "table")
     return next((preset for preset in candidates if preset.fits(headings)), None)
+
+
+def generic() -> Preset:
+    """The preset that reads headings by their words, whatever device they are of."""
+    return next(preset for preset in presets().values() if preset.vocabulary is not None)
+
+
+def single_axes(headings: Headings) -> list[str]:
+    """The columns that are said to be a component of a signal, whether or not its others are there."""
+    told = zip(headings.written, _vocabulary(generic().name).meanings(headings), strict=True)
+    return [heading for heading, meaning in told if meaning is not None and meaning.signal is not None]
 
 
 def fitting(headings: Headings, *, but: str | None) -> list[str]:
