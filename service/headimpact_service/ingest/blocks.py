@@ -46,6 +46,16 @@ def are_named_apart(cells: Sequence[str]) -> bool:
     return are_several(cells) or len(_lengths(cells, STAY_AS_NAME)) > 1
 
 
+def number_impacts(cells: Sequence[str]) -> bool:
+    """Whether a column of a word for impacts has a whole number for each of some, or a name of its own in each row."""
+    told = list(filter(None, map(said, cells)))
+    distinct = set(told)
+    if len(told) > SHORTEST and len(distinct) == len(cells):
+        return not any(map(_WITH_PARTS.fullmatch, distinct))
+    numbers = numbers_said(list(distinct))
+    return len(numbers) == len(distinct) and are_several(cells) and not _are_yes_or_no(distinct)
+
+
 def tell_parts(cells: Sequence[str]) -> bool:
     """Whether a column parts its rows as impacts are parted, whatever it is called: in blocks, or counting anew."""
     return lie_in_blocks(cells) or lie_in_long_blocks(cells) or _count_up(_blocks(cells)) or _counts_anew(cells)
@@ -118,6 +128,9 @@ def _lengths(cells: Sequence[str], shortest: int) -> dict[str, int]:
 
 
 def _count_up(blocks: Mapping[str, int]) -> bool:
-    """Whether three values or more count up one by one, each for many rows, however many these are."""
+    """Whether values count up one by one, each for many rows, however many these are: three, or 1 and 2 for more."""
     told = numbers_said(list(blocks))
-    return len(told) == len(blocks) > 2 and min(blocks.values()) >= STAY and set(np.diff(told)) == {1.0}
+    if len(told) < len(blocks) or set(np.diff(told)) != {1.0}:
+        return False
+    shortest = min(blocks.values())
+    return shortest >= STAY if len(told) > 2 else told == [1.0, 2.0] and shortest >= LONG

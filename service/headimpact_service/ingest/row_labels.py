@@ -17,6 +17,7 @@ from headimpact_service.ingest.blocks import (
     count_triggers,
     lie_in_long_blocks,
     mark_blocks,
+    number_impacts,
     peaks_lie_in_blocks,
     tell_parts,
 )
@@ -83,6 +84,7 @@ class RowLabels:
         unread = self.layout.unread
         for columns, tell, what in (
             (unread.names, are_named_apart if unread.alone else are_several, _SAY),
+            (unread.impacts, number_impacts, _SAY),
             (unread.times, partial(lie_apart, time_zone=time_zone), _TIME),
             (unread.counters, begins_anew, _COUNT),
             (unread.others, tell_parts, _SAY),

@@ -61,9 +61,17 @@ def follows(stamps_ms: FloatArray, rate_hz: float, *, drift: float = DRIFT) -> b
         return True
     step = 1000.0 / rate_hz
     elapsed = np.arange(stamps_ms.size) * step
+    near = NEAR * step + _rounding(stamps_ms, step)
     stray = np.abs(stamps_ms - stamps_ms[0] - elapsed)
-    near = bool((stray <= NEAR * step + rounded_to(stamps_ms) + drift * elapsed).all())
-    return near and _steps_by(stamps_ms, step, drift)
+    uneven = np.abs(np.diff(stamps_ms) - step)  # by a sample that is left out, wherever it is
+    is_near = bool((stray <= near + drift * elapsed).all() and (uneven <= near + drift * step).all())
+    return is_near and _steps_by(stamps_ms, step, drift)
+
+
+def _rounding(stamps_ms: FloatArray, step_ms: float) -> float:
+    """How far rounding may take a stamp from its place beside another: steps of whole digits are not rounded."""
+    grid = rounded_to(stamps_ms)
+    return 0.0 if grid and _are_multiples(np.array([step_ms]), grid) else grid
 
 
 def _steps_by(stamps_ms: FloatArray, step_ms: float, drift: float) -> bool:

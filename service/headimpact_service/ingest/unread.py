@@ -30,11 +30,20 @@ _NAMES = frozenset(
         *("player", "athlete", "subject", "wearer", "user", "participant", "team", "sensor", "device"),
     }
 )
+_IMPACTS = frozenset(
+    {
+        *("impact", "hit", "event", "trial", "test", "shot", "drop", "collision"),
+        *("aufprall", "stoss", "stoß", "schlag", "versuch", "treffer", "choc", "coup", "essai"),
+        *("impacto", "golpe", "ensayo", "colpo", "prova"),
+    }
+)
+"""Words for an impact itself, or for what was done to make one."""
 _PARTS = frozenset(
     {
         *("case", "no", "nr", "num", "number", "seq", "sequence", "series", "set", "batch", "round", "take", "code"),
         *("clip", "video", "play", "match", "game", "quarter", "week", "day"),
         *("helmet", "headform", "mouthguard", "mg", "condition", "group", "cluster"),
+        *_IMPACTS,
     }
 )
 """Words of what may differ from impact to impact; they tell only where nothing else would."""
@@ -56,6 +65,7 @@ _COUNTS = frozenset({_NUMBER_SIGN, "count"})
 """Words that, like names, make a trigger one that is counted."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
+_DATE = re.compile(r"[0-9]{1,4}([-./])[0-9]{1,2}\1[0-9]{1,4}", re.ASCII)
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
 ROUNDED_TO_S = 1.0
 """Times of samples may be written to the second."""
@@ -78,6 +88,8 @@ class Unread:
     triggers: tuple[int, ...] = ()
     measured: tuple[int, ...] = ()
     peaks: tuple[int, ...] = ()
+    impacts: tuple[int, ...] = ()
+    """Names of impacts that tell even where something else would: by a number of its own, or one each row."""
     hints: tuple[int, ...] = ()
     """Names that tell nothing where samples have times, but how to part the rows if these begin anew."""
     alone: bool = False
@@ -94,7 +106,7 @@ class Unread:
     @property
     def watched(self) -> tuple[int, ...]:
         """Those that must say the same, or count on, within an impact."""
-        told = (*self.names, *self.times, *self.counters, *self.others)
+        told = (*self.names, *self.times, *self.counters, *self.others, *self.impacts)
         return (*told, *self.marks, *self.triggers, *self.peaks, *self.measured)
 
     @property
@@ -120,7 +132,11 @@ def unread_columns(
     found: dict[str, list[int]] = {}
     for column, heading in enumerate(headings):
         words = {*words_of(heading), *(_NUMBER_SIGN if _NUMBER_SIGN in heading else "")}
-        if column in passed or (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
+        if column in passed:
+            continue
+        if words & _IMPACTS and not (named or words & (_MEASURED | _STATES)):
+            found.setdefault("impacts", []).append(column)
+        if (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
             continue
         if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks", "triggers", "measured"}:
             found.setdefault(kind, []).append(column)
@@ -170,6 +186,8 @@ def lie_apart(cells: Sequence[str], time_zone: str | None) -> bool:
         stamps = numbers_said(cells)
         fall = any(after < before for before, after in pairwise(stamps))
         return fall or (len(told) * STAY <= len(cells) and stamps[-1] - stamps[0] > most)
+    if all(map(_DATE.fullmatch, told)):
+        return True
     moments = [when for text in told if (when := moment_of(text, time_zone)) is not None]
     if len(moments) == len(told):
         return span_s(moments) > most

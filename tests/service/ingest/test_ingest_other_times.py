@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from binary_files import COLUMNS, npz, pa, parquet
-from ingest_files import codes, one, outcome, read, refused, six_axis
+from ingest_files import GENERIC, codes, one, outcome, read, refused, six_axis
 from making import table
 
 from headimpact_service.ingest.mapping import Mapping
@@ -358,3 +358,19 @@ def test_lists_of_samples_that_are_called_a_rate_are_no_rate():
         "Gyro Rate (Hz)": [[float(n) for n in range(40)]],
     }
     assert rates(one(parquet(pa.table(columns | lists)))) == [1000.0, 1000.0]
+
+
+@pytest.mark.parametrize("lost", [1, 14, 50, 85, 98])
+@pytest.mark.parametrize(("rate_hz", "digits"), [(1000, 0), (1000, 3), (2000, 1), (500, 0), (3200, 4)])
+def test_a_rate_does_not_make_up_for_a_lost_sample(lost: int, rate_hz: int, digits: int):
+    times = [f"{sample * 1000 / rate_hz - 10:.{digits}f}" for sample in range(100)]
+    lines = [",".join([time, *map(str, row)]) for time, row in zip(times, six_axis(100).tolist(), strict=True)]
+    heading = GENERIC.replace("t_s", "t_ms")
+    assert rates(one("\n".join([heading, *lines]), sample_rate_hz=float(rate_hz))) == [rate_hz] * 2
+    without = "\n".join([heading, *lines[:lost], *lines[lost + 1 :]])
+    assert codes(refused(without, sample_rate_hz=float(rate_hz))) == [("sample_rate_hz", "rate-differs")]
+    stated = Mapping.model_validate({"sample_rate_hz": rate_hz})
+    assert codes(refused(without, mapping=stated)) == [("sample_rate_hz", "rate-differs")]
+    column = [f"{line},{rate_hz}" for line in without.split("\n")[1:]]
+    in_rows = "\n".join([f"{heading},sample_rate_hz", *column])
+    assert codes(refused(in_rows)) == [("sample_rate_hz", "rate-differs")]

@@ -84,7 +84,6 @@ def test_rows_that_an_unread_column_tells_apart_are_refused(heading: str, cells:
     ("heading", "cells"),
     [
         ("Impact", each(1)),
-        ("Event ID", range(SAMPLES)),
         ("id", [f"{n:03}" for n in range(SAMPLES)]),
         ("Seq", range(7, 7 + 2 * SAMPLES, 2)),
         ("Impact Force N", np.sin(np.arange(SAMPLES) / 9).round(2).tolist()),
@@ -161,6 +160,36 @@ def test_a_value_an_impact_parts_the_rows(heading: str, names: Sequence[object],
     assert shape(one(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[]))) == sum(lengths)
     found = read(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[heading]))
     assert [shape(record) for record in found] == list(lengths)
+
+
+@pytest.mark.parametrize("heading", ["Impact", "Event ID", "Event", "Hit #", "Trial", "Test No", "Versuch", "Choc"])
+@pytest.mark.parametrize("names", [range(SAMPLES), range(SAMPLES, 0, -1), [f"ev-{n}" for n in range(SAMPLES)]])
+def test_a_row_an_impact_is_no_record(heading: str, names: Sequence[object]) -> None:
+    text = untimed(heading, names, records=1)
+    assert codes(refused(text, sample_rate_hz=1000.0)) == [(None, "several-impacts")]
+    assert shape(one(text, sample_rate_hz=1000.0, mapping=Mapping(group_by=[]))) == SAMPLES
+
+
+def test_days_that_differ_are_not_of_one_impact() -> None:
+    days = [f"2026-10-{1 + n // 2:02}" for n in range(SAMPLES)]
+    assert codes(refused(untimed("Date", days, records=1), sample_rate_hz=1000.0)) == [(None, "several-impacts")]
+
+
+@pytest.mark.parametrize("heading", ["Aufprall", "Stoß", "Choc", "Golpe", "Rep", "Zone"])
+def test_two_numbers_of_unequal_lengths_part_the_rows(heading: str) -> None:
+    text = long(heading, (1, 2), (100, 99))
+    assert codes(refused(text, sample_rate_hz=1000.0)) == [(None, "several-impacts")]
+
+
+@pytest.mark.parametrize("heading", ["Impact #", "Impact", "Event", "Event ID", "Hit No", "Trial"])
+def test_numbers_of_impacts_part_rows_whose_times_go_on(heading: str) -> None:
+    first, *lines = csv_text(np.vstack([six_axis(SAMPLES), six_axis(SAMPLES)])).splitlines()
+    text = "\n".join([f"{heading},{first}", *(f"{1 + n // SAMPLES},{line}" for n, line in enumerate(lines))])
+    assert codes(refused(text)) == [(None, "several-impacts")]
+    assert shape(one(text, mapping=Mapping(group_by=[]))) == 2 * SAMPLES
+    assert len(read(text, mapping=Mapping(group_by=[heading]))) == 2
+    flagged = "\n".join([f"{heading},{first}", *(f"{int(n > 9)},{line}" for n, line in enumerate(lines))])
+    assert shape(one(flagged)) == 2 * SAMPLES
 
 
 def test_a_peak_in_the_first_row_of_each_impact_parts_the_rows() -> None:
@@ -259,7 +288,7 @@ def test_numbers_of_samples_that_leave_some_out_are_refused_with_what_helps(head
 
 @pytest.mark.parametrize(
     ("heading", "named"),
-    [("", False), *((name, True) for name in ("Unnamed: 0", "tick", "No", "Nr", "Seq", "ID", "record", "Event"))],
+    [("", False), *((name, True) for name in ("Unnamed: 0", "tick", "No", "Nr", "Seq", "ID", "record"))],
 )
 def test_numbers_of_rows_that_were_lost_are_seen_whatever_they_are_called(heading: str, named: bool) -> None:
     problem = refused(counted(heading, [n for n in range(SAMPLES) if n != 15]), sample_rate_hz=1000.0)
