@@ -65,6 +65,7 @@ _COUNTS = frozenset({_NUMBER_SIGN, "count"})
 """Words that, like names, make a trigger one that is counted."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
+_NO_NAMES = _MEASURED | _STATES | _TIMES | _COUNTERS
 _DATE = re.compile(r"[0-9]{1,4}([-./])[0-9]{1,2}\1[0-9]{1,4}", re.ASCII)
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
 ROUNDED_TO_S = 1.0
@@ -134,7 +135,7 @@ def unread_columns(
         words = {*words_of(heading), *(_NUMBER_SIGN if _NUMBER_SIGN in heading else "")}
         if column in passed:
             continue
-        if words & _IMPACTS and not (named or words & (_MEASURED | _STATES)):
+        if words & _IMPACTS and not (named or words & _NO_NAMES):
             found.setdefault("impacts", []).append(column)
         if (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
             continue
