@@ -9,7 +9,8 @@ from headimpact.recording import SignalName
 from headimpact_service.ingest.axis_peaks import unclear_axis
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.layout import Layout
-from headimpact_service.ingest.other_times import other_times, stated_above
+from headimpact_service.ingest.lines_above import rates_stated
+from headimpact_service.ingest.other_times import other_times
 from headimpact_service.ingest.presets import keys_of, times_of
 from headimpact_service.ingest.supplied import spoken_in
 from headimpact_service.ingest.table import Table
@@ -22,7 +23,7 @@ def with_other_times(layout: Layout, headings: Headings, table: Table, *, rates:
     others = other_times(headings, read, table, times_of(headings))
     if not rates:
         return replace(layout, others=replace(others, rates=()))
-    return replace(layout, others=replace(others, stated=tuple(stated_above(table.above))))
+    return replace(layout, others=replace(others, stated=tuple(rates_stated(table.above))))
 
 
 def with_supplied(layout: Layout, headings: Headings, table: Table) -> Layout:

@@ -108,14 +108,13 @@ class Worker:
 class GuardedTable:
     """A table that the parsing process reads: see :class:`headimpact_service.ingest.table.Table`."""
 
-    above: Sequence[Sequence[str]] = ()
-
     def __init__(self, reading: Reading, fields: Frame) -> None:
         """A table as its headings were announced."""
         self._reading = reading
         self.name: str | None = fields.fields["name"]
         self.headings = tuple(str(heading) for heading in fields.fields["headings"])
         self.units = {int(column): str(unit) for column, unit in fields.fields["units"].items()}
+        self.above: Sequence[Sequence[str]] = [list(map(str, row)) for row in fields.fields["above"]]
         self.dated = frozenset(map(int, fields.fields["dated"]))
         self.parted = bool(fields.fields["parted"])
         self.wordless = frozenset(map(int, fields.fields["wordless"]))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from math import inf
 
-from headimpact_service.ingest.cells import number_said
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS
 from headimpact_service.ingest.spelling import compact
@@ -19,13 +17,6 @@ from headimpact_service.ingest.time_headings import (
     period_of_samples,
     unit_of_times,
 )
-
-_WITH_VALUE = re.compile(r"([^:=]+)[:=](.+)", re.DOTALL)
-"""A row's name with what it says in one cell: `Sample rate (Hz): 2000`."""
-_NUMBER = re.compile(r"([+-]?[0-9.,]+(?:[eE][+-]?[0-9]+)?)\s*([A-Za-zµ]*)")
-"""A number, and its unit if that stands behind it."""
-_COMMENT = "#%;/*! "
-"""What lines of comment begin with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,25 +59,6 @@ class OtherTimes:
 
 
 NO_OTHERS = OtherTimes()
-
-
-def stated_above(rows: Sequence[Sequence[str]]) -> Iterator[tuple[str, float]]:
-    """The sample rates that rows above the headings state: a name, and a number in its cell or in the one behind it."""
-    for row in rows:
-        name, *cells = [cell.strip() for cell in row] or [""]
-        if with_value := _WITH_VALUE.fullmatch(name):
-            name, cells = with_value[1].strip(), [with_value[2].strip(), *cells]
-        name = name.lstrip(_COMMENT)
-        found = next((read for cell in cells if (read := _NUMBER.fullmatch(cell)) is not None), None)
-        number = None if found is None else number_said(found[1])
-        if found is None or number is None:
-            continue
-        beside = found[2] or None
-        hertz, period_ms = hertz_of_rates(name, beside, fs_is_rate=True), period_of_samples(name, beside)
-        if hertz is not None:
-            yield name, number * hertz
-        elif period_ms is not None and number > 0.0:
-            yield name, 1000.0 / (number * period_ms)
 
 
 def other_times(headings: Headings, read: Collection[int], table: Table, times: Collection[int]) -> OtherTimes:

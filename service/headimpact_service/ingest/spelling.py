@@ -17,7 +17,10 @@ _PRESET = files("headimpact_service.ingest") / "presets" / "generic_six_axis.tom
 
 
 def words_of(heading: str) -> list[str]:
-    """The words of a heading in small letters, whatever parts them: punctuation, numbers or a capital."""
+    """The words of a heading in small letters without accents, whatever parts them: punctuation, numbers, a capital."""
+    if not heading.isascii():
+        whole = unicodedata.normalize("NFD", heading.replace("ß", "ss"))
+        heading = "".join(letter for letter in whole if not unicodedata.combining(letter))
     return [word.lower() for word in _WORD.findall(heading)]
 
 

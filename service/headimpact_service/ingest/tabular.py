@@ -15,6 +15,7 @@ from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.laying_out import lay_out
 from headimpact_service.ingest.layout import Layout
+from headimpact_service.ingest.lines_above import axes_stated
 from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.no_signal import is_no_signal, with_remedies
 from headimpact_service.ingest.options import ImportOptions
@@ -55,6 +56,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     _require_no_other_device(layout, plan, headings)
     _require_rate(layout, plan)
     _require_no_other_rate(layout, plan, headings)
+    _require_no_other_axes(layout, plan, table)
     if options.mapping is None or "time" not in options.mapping.model_fields_set:
         layout = with_other_times(layout, headings, table, rates=_reads_rates(options))
     if plan.preset is not None:
@@ -217,6 +219,20 @@ def _names_columns(mapping: Mapping) -> Iterator[str]:
         yield from (f"{name}.{kind}" for kind in ("resultant", "peak") if getattr(value, kind, None) is not None)
         if name in {"context", "reading"}:
             yield from (f"{name}.{field}" for field, spellings in value.items() if spellings is not None)
+
+
+def _require_no_other_axes(layout: Layout, plan: Plan, table: Table) -> None:
+    """Refuse to take the axes for anatomical where a row above the headings says that they are SAE's."""
+    sent = plan.options.mapping
+    said = plan.options.axes is not None or (sent is not None and sent.axes is not None) or "axes" in layout.reading
+    if said or plan.mapping.axes == "sae_j211" or (stated := axes_stated(table.above)) is None:
+        return
+    raise file_fault(
+        f"A row above the headings says {stated} of the axes, which is not read: give axes beside the file (sae_j211, "
+        "or anatomical if the samples are).",
+        "axes-unclear",
+        parameter="axes",
+    )
 
 
 def _require_rate(layout: Layout, plan: Plan) -> None:

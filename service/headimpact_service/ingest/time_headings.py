@@ -35,13 +35,18 @@ _RATES = frozenset(
         *("dt", "step", "timestep", "interval", "period", "tvec", "tms", "ts", "tt", "timebase"),
     }
 )
-_RATE = frozenset({"rate", "frequency", "freq"})
-_OF_SAMPLES = frozenset({"sample", "samples", "sampling", "acquisition", "logging"})
+_RATE = frozenset({"rate", "frequency", "freq", "frequenz", "frequence", "frecuencia", "frequenza"})
+_OF_SAMPLES = frozenset(
+    {
+        *("sample", "samples", "sampling", "acquisition", "logging"),
+        *("abtast", "echantillonnage", "acquisizione", "muestreo", "campionamento"),
+    }
+)
 _TRIGGER = frozenset({"trigger", "triggered", "rel", "relative", "contact", "zero"})
-_PERIODS = frozenset({"dt", "interval", "period", "step"})
+_PERIODS = frozenset({"dt", "interval", "period", "step", "abtastintervall", "abtastperiode"})
 _ALONE = frozenset(
     {
-        *("odr", "sr", "sps", "abtastrate", "samplerate", "samplingrate"),
+        *("odr", "sr", "sps", "abtastrate", "abtastfrequenz", "messrate", "samplerate", "samplingrate"),
         *("samplefreq", "samplingfreq", "samplefrequency", "samplingfrequency"),
     }
 )
@@ -54,6 +59,13 @@ _NOT_OF_SAMPLES = frozenset(
     }
 )
 """Words of what has times and rates of its own and is none of the signals, or no longer those of the samples."""
+_OTHER_RATES = frozenset(
+    {
+        *("low", "pass", "notch", "resonant", "resonance", "natural", "line", "mains"),
+        *("trigger", "export", "report", "reporting", "transmission", "update", "refresh"),
+    }
+)
+"""Words of what has a frequency that is none of samples."""
 _OF_SIGNALS = frozenset({"rad", "deg", "degrees", "dps", "g", "m", "x", "y", "z"})
 """Words of a signal's units and axes."""
 _SENSORS: dict[SignalName, frozenset[str]] = {
@@ -91,7 +103,8 @@ def period_of_samples(heading: str, beside: str | None) -> float | None:
     if words & (_NOT_OF_SAMPLES | _OF_SIGNALS) or not words & _PERIODS:
         return None
     unit = unit_of_times(heading, beside)
-    return None if unit is None or not words & (_OF_SAMPLES | _ANY_SENSOR | {"dt"}) else TIME_UNITS[unit]
+    of_samples = words & (_OF_SAMPLES | _ANY_SENSOR | {"dt", "abtastintervall", "abtastperiode"})
+    return TIME_UNITS[unit] if unit is not None and of_samples else None
 
 
 def unit_of_times(heading: str, beside: str | None) -> str | None:
@@ -115,8 +128,10 @@ def hertz_of_rates(heading: str, beside: str | None, *, fs_is_rate: bool) -> flo
     Of one sensor `fs` may be its full scale, unless the table has a rate of this name.
     """
     words = _words(heading) | _words(beside or "")
-    if words & (_NOT_OF_SAMPLES | _OF_SIGNALS):
+    if words & (_NOT_OF_SAMPLES | _OF_SIGNALS | _OTHER_RATES):
         return None
+    if words & _OF_SAMPLES and (beside or "").lower() in {"s/s", "sa/s", "sps"}:
+        return 1.0
     if len(words) == 1 and words & (_RATE | {"hz", "fs", "srate", "fsamp", "fsample"}):
         return 1.0
     in_hertz = "hz" in words and words & (_OF_SAMPLES | _ANY_SENSOR | _RATE | {"fs"})

@@ -33,7 +33,7 @@ _NAMES = frozenset(
 _IMPACTS = frozenset(
     {
         *("impact", "hit", "event", "trial", "test", "shot", "drop", "collision"),
-        *("aufprall", "stoss", "stoß", "schlag", "versuch", "treffer", "choc", "coup", "essai"),
+        *("aufprall", "stoss", "schlag", "versuch", "treffer", "choc", "coup", "essai"),
         *("impacto", "golpe", "ensayo", "colpo", "prova"),
     }
 )

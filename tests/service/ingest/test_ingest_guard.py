@@ -291,7 +291,17 @@ def answered(*frames: wire.Frame | bytes) -> Iterator[guard.GuardedTable | guard
 
 
 TABLE = wire.Frame(
-    "table", {"name": None, "headings": ["a"], "units": {}, "dated": [], "wordless": [], "parted": True, "sampled": "1"}
+    "table",
+    {
+        "name": None,
+        "headings": ["a"],
+        "units": {},
+        "dated": [],
+        "wordless": [],
+        "above": [],
+        "parted": True,
+        "sampled": "1",
+    },
 )
 
 
@@ -328,7 +338,16 @@ def test_a_frame_that_is_not_what_was_asked_for_ends_the_reading(frame: wire.Fra
         wire.Frame("table", {"name": None, "headings": ["a"]}),
         wire.Frame(
             "table",
-            {"name": None, "headings": 7, "units": {}, "dated": [], "wordless": [], "parted": True, "sampled": "1"},
+            {
+                "name": None,
+                "headings": 7,
+                "units": {},
+                "dated": [],
+                "wordless": [],
+                "above": [],
+                "parted": True,
+                "sampled": "1",
+            },
         ),
         wire.Frame(
             "table",
@@ -338,6 +357,7 @@ def test_a_frame_that_is_not_what_was_asked_for_ends_the_reading(frame: wire.Fra
                 "units": {"x": "g"},
                 "dated": [],
                 "wordless": [],
+                "above": [],
                 "parted": True,
                 "sampled": "",
             },

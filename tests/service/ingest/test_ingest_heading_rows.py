@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from binary_files import xlsx
+from binary_files import pa, parquet, xlsx
 from ingest_files import GENERIC, codes, csv_text, one, read, refused, six_axis
 
 from headimpact.preparation import prepare
@@ -302,6 +302,17 @@ def test_each_sensor_may_have_its_own_column_of_one_heading():
         "Sample interval (ms),0.5",
         "# Sample rate (Hz),2000",
         "#Sample rate = 2000 Hz",
+        "Sampling rate,2,kHz",
+        "Sampling rate,2000,[Hz]",
+        'Sample rate (Hz),"2,000"',
+        "Sampling interval,0.5,ms",
+        "Sampling interval [s]:,0.0005",
+        "Abtastrate: 2000 Hz",
+        "Messrate,2000,Hz",
+        "Abtastintervall: 0.5 ms",
+        "Fréquence d'échantillonnage (Hz),2000",
+        "Frecuencia de muestreo (Hz),2000",
+        "Acquisition: 2000 S/s",
     ],
 )
 def test_a_rate_that_is_stated_above_the_headings_is_held_against_the_sender_s(line: str):
@@ -310,3 +321,55 @@ def test_a_rate_that_is_stated_above_the_headings_is_held_against_the_sender_s(l
     )
     assert codes(refused(text, sample_rate_hz=1000.0)) == [("sample_rate_hz", "rate-differs")]
     assert one(text, sample_rate_hz=2000.0).recording.linear_acceleration.sample_rate_hz == 2000.0
+
+
+def in_sheet(*above: list[object]) -> bytes:
+    rows = [line.partition(",")[2].split(",") for line in csv_text().splitlines()]
+    return xlsx({"a": [*above, [], rows[0], *([float(cell) for cell in row] for row in rows[1:])]})
+
+
+def in_parquet(**said: str) -> bytes:
+    columns = {name: six_axis()[:, place] for place, name in enumerate(GENERIC.split(",")[1:])}
+    return parquet(pa.table(columns).replace_schema_metadata(said))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        in_sheet(["Sample rate (Hz)", 2000]),
+        in_sheet(["Sample rate: 2000 Hz"]),
+        in_sheet(["Test", "T7"], ["Sampling interval", 0.5, "ms"]),
+        in_parquet(sample_rate_hz="2000"),
+    ],
+)
+def test_a_rate_that_a_sheet_or_a_files_metadata_states_is_held_against_the_senders(data: bytes):
+    assert codes(refused(data, sample_rate_hz=1000.0)) == [("sample_rate_hz", "rate-differs")]
+    assert one(data, sample_rate_hz=2000.0).recording.linear_acceleration.sample_rate_hz == 2000.0
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Low pass frequency (Hz),300",
+        "Resonant frequency (Hz),26000",
+        "Line frequency (Hz),50",
+        "Trigger rate (Hz),1",
+        "Export rate (Hz),100",
+        "Filter frequency (Hz),300",
+    ],
+)
+def test_a_frequency_that_is_none_of_samples_is_passed_over(line: str):
+    assert one(f"{line}\n{csv_text()}").recording.linear_acceleration.sample_rate_hz == 1000.0
+
+
+@pytest.mark.parametrize(
+    "line", ["Coordinate system,SAE J211", "# axes: sae_j211", "Axes: SAE J211/1", "Polarity,SAE J211-1"]
+)
+def test_axes_that_are_stated_above_the_headings_are_not_passed_over(line: str):
+    text = f"{line}\n{csv_text()}"
+    problem = refused(text)
+    assert codes(problem) == [("axes", "axes-unclear")]
+    assert "give axes beside the file" in problem.detail
+    assert one(text, axes="sae_j211").recording.axes == "sae_j211"
+    assert one(text, axes="anatomical").recording.axes == "anatomical"
+    assert one(f"Axes,anatomical\n{csv_text()}").recording.axes == "anatomical"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ import pyarrow.compute as pc
 
 from headimpact_service.ingest.cells import Words, number_text
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, are_dated
-from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
+from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, stated, unreadable
 from headimpact_service.ingest.guarded.nested_columns import Batches, laid_out
+from headimpact_service.ingest.heading_rows import LOOK
 from headimpact_service.ingest.table import Columns, FloatArray
 
 MICROSECONDS = "us"
@@ -21,6 +23,8 @@ UNIT_KEYS = (b"unit", b"units")
 ROWS_AT_ONCE = 8192
 MAX_LIST = 20_001
 """Of a longer list this much is read: one sample more than an impact may have, which is then refused by name."""
+MAX_SAID = 100
+"""Bytes of a value in a table's metadata that may be a rate: data frames keep a page of theirs there."""
 _NO_TEXT = "A column that is to be read as text holds something else."
 _EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
 
@@ -43,12 +47,11 @@ def is_list_of_numbers(kind: pa.DataType) -> bool:
 class ArrowTable:
     """A table over batches of Arrow columns."""
 
-    above: Sequence[Sequence[str]] = ()
-
     def __init__(self, schema: pa.Schema, batches: Batches) -> None:
         """Look at the schema, and for times that are text at the first rows."""
         schema, batches = laid_out(schema, batches)
         self.headings = checked_headings(schema.names)
+        self.above: Sequence[Sequence[str]] = _said_of_all(schema)
         self._types = list(schema.types)
         self._batches = batches
         self.units = {place: unit for place, field in enumerate(schema) if (unit := _unit(field)) is not None}
@@ -169,6 +172,12 @@ def _instant(microseconds: int, *, placed: bool) -> str:
     except OverflowError:
         return "out of range"
     return moment.isoformat() if placed else moment.replace(tzinfo=None).isoformat()
+
+
+def _said_of_all(schema: pa.Schema) -> list[list[str]]:
+    """What the file's metadata says of the table, as rows above its headings."""
+    short = islice(((key, value) for key, value in (schema.metadata or {}).items() if len(value) <= MAX_SAID), LOOK)
+    return [stated(part.decode("utf-8", "replace") for part in pair) for pair in short]
 
 
 def _unit(field: pa.Field) -> str | None:

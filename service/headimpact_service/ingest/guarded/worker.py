@@ -116,6 +116,7 @@ def _offer(connection: socket.socket, content: NamedTable) -> bool:
         "name": content.name,
         "headings": table.headings,
         "units": units,
+        "above": [list(row) for row in table.above],
         "dated": list(table.dated),
         "wordless": list(table.wordless),
         "parted": table.parted,

@@ -25,9 +25,10 @@ from headimpact_service.ingest.guarded.contents import (
     NamedTable,
     checked_headings,
     checked_text,
+    stated,
     unreadable,
 )
-from headimpact_service.ingest.heading_rows import are_units, joined
+from headimpact_service.ingest.heading_rows import LOOK, are_units, joined
 from headimpact_service.ingest.spelling import known_units
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
@@ -65,10 +66,10 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
         raise unreadable(f"A workbook may have at most {MAX_SHEETS} sheets.")
     found = False
     for name in names:
-        blocks = _blocks(workbook.get_sheet_by_name(name))
+        blocks, above = _blocks(workbook.get_sheet_by_name(name))
         if blocks:
             found = True
-            yield NamedTable(checked_text(name), SheetTable(blocks))
+            yield NamedTable(checked_text(name), SheetTable(blocks, above))
     if not found:
         raise unreadable("No sheet of the workbook has headings with numbers below them.")
 
@@ -105,10 +106,10 @@ class SheetTable:
 
     parted = False
     wordless = frozenset[int]()
-    above: Sequence[Sequence[str]] = ()
 
-    def __init__(self, blocks: list[_Block]) -> None:
-        """Headings of all blocks, in their order."""
+    def __init__(self, blocks: list[_Block], above: list[list[str]]) -> None:
+        """Headings of all blocks, in their order, and the rows above the first of them."""
+        self.above: Sequence[Sequence[str]] = above
         self.headings = checked_headings(heading for block in blocks for heading in block.headings)
         self.units = dict(enumerate(checked_headings(unit for block in blocks for unit in block.units)))
         self._places = [(block, place) for block in blocks for place in range(len(block.columns))]
@@ -160,9 +161,10 @@ class SheetTable:
         return [_text(cell) for cell in block.cells(column)] + [""] * (self._rows - len(block.rows))
 
 
-def _blocks(sheet: CalamineSheet) -> list[_Block]:
-    """Rows below the headings they belong to; rows without a number are words between them."""
+def _blocks(sheet: CalamineSheet) -> tuple[list[_Block], list[list[str]]]:
+    """Rows below the headings they belong to, and those above all; rows without a number are words between them."""
     blocks: list[_Block] = []
+    first: list[list[str]] = []
     above: list[Row] = [[], [], []]
     empty: list[Row] = []
     for row in sheet.iter_rows():
@@ -177,8 +179,10 @@ def _blocks(sheet: CalamineSheet) -> list[_Block]:
             if blocks:
                 blocks[-1].rows += [*empty, row]
                 empty = []
+        if not blocks and len(first) < LOOK:
+            first.append(stated(map(_stated, row)))
         above = [*above[1:], row]
-    return blocks
+    return blocks, first
 
 
 def _begun(top: Row, above: Row, before: Row) -> _Block | None:
@@ -191,6 +195,10 @@ def _begun(top: Row, above: Row, before: Row) -> _Block | None:
     columns = _named_columns(headings)
     said = [_word(units[column]) if column < len(units) else "" for column in columns]
     return _Block(columns, [headings[column].strip() for column in columns], said)
+
+
+def _stated(cell: Any) -> str:  # noqa: ANN401 - any cell
+    return number_text(float(cell)) if _is_number(cell) else _word(cell)
 
 
 def _word(cell: Any) -> str:  # noqa: ANN401 - any cell
