@@ -10,7 +10,8 @@ from itertools import accumulate
 
 from headimpact.recording import AXES, SIGNALS
 from headimpact_service.ingest.cells import is_written_number
-from headimpact_service.ingest.spelling import compact, known_units, unit_ending
+from headimpact_service.ingest.scaled_units import known_units
+from headimpact_service.ingest.spelling import compact, unit_ending
 from headimpact_service.ingest.text_facts import DELIMITERS
 
 LOOK = 60

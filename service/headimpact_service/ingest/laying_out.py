@@ -12,7 +12,8 @@ from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.layout import Clock, Component, Layout, SignalLayout
 from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS, DateAndTime, Mapping, SignalColumns
 from headimpact_service.ingest.no_signal import no_signal
-from headimpact_service.ingest.spelling import unit_spelled
+from headimpact_service.ingest.scaled_units import SCALED_UNITS, unit_written
+from headimpact_service.ingest.spelling import unit_ending, unit_spelled
 from headimpact_service.ingest.supplied import Kind, Supplied, supplied_in
 
 
@@ -76,16 +77,41 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: fr
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)
     _require_distinct(name, (x, y, z))
     places = [component.column for component in (x, y, z) if component.column is not None]
-    unit = _unit(name, columns, headings.units_beside(name, places))
+    _require_unit_written(name, columns, headings, places)
+    said = _unit(name, columns, headings.units_beside(name, places))
+    unit, size = SCALED_UNITS.get(said, (said, 1.0))
     return SignalLayout(
         unit=unit,
-        components=(x, y, z),
+        components=(_scaled(x, size), _scaled(y, size), _scaled(z, size)),
         clock=_own_clock(name, columns, headings, min(places), required=name in required),
-        resultants=_supplied(name, "resultant", columns, unit, headings, required),
-        peaks=_supplied(name, "peak", columns, unit, headings, required),
+        resultants=_supplied(name, "resultant", columns, said, headings, required),
+        peaks=_supplied(name, "peak", columns, said, headings, required),
         sample_rate_hz=columns.sample_rate_hz,
-        full_scale=columns.range,
+        full_scale=None if columns.range is None else columns.range * size,
     )
+
+
+def _scaled(component: Component, size: float) -> Component:
+    return component if size == 1.0 else Component(component.column, component.factor * size)
+
+
+def _require_unit_written(name: SignalName, columns: SignalColumns, headings: Headings, places: Sequence[int]) -> None:
+    """Refuse a mapping's unit where a heading names another, or one of another quantity."""
+    if columns.unit is None:
+        return
+    for column in places:
+        heading = headings.written[column]
+        beside = headings.units.get(column)
+        if unit_spelled(name, beside) is not None:  # as it does for a signal without a unit
+            continue
+        written = unit_written(heading) or (unit_written(f"[{beside}]") if beside else None)
+        if written is not None and columns.unit not in written:
+            raise layout_problem(
+                f"The column {heading} of the {name} is said to be in {columns.unit}, and the file says "
+                f"{' or '.join(sorted(written))}: name the unit of its numbers, or correct the file.",
+                code="units-differ",
+                pointer=f"/{name}/unit",
+            )
 
 
 def _require_distinct(name: SignalName, components: Sequence[Component]) -> None:
@@ -169,11 +195,14 @@ def _clock_in(column: int, unit: str, headings: Headings) -> Clock:
     """A column of stamps in a unit, unless the file says another beside its heading; dates have a unit of their own."""
     if column in headings.dated:
         return Clock(column, TIME_UNITS[DATES_IN], dated=True)
-    beside = unit_spelled("time", headings.units.get(column))
-    if beside not in {None, unit}:
-        raise layout_problem(
-            f"The column of the time is said to be in {unit} and in {beside}.", code="units-differ", pointer="/time"
-        )
+    heading = headings.written[column]
+    for beside in (unit_spelled("time", headings.units.get(column)), unit_ending("time", heading)):
+        if beside not in {None, unit}:
+            raise layout_problem(
+                f"The column {heading} of the time is said to be in {unit} and in {beside}.",
+                code="units-differ",
+                pointer="/time",
+            )
     return Clock(column, TIME_UNITS[unit])
 
 

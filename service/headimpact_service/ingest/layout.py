@@ -15,10 +15,13 @@ from headimpact_service.ingest.unread import NOTHING_UNREAD, Unread
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """One component's column and sign; `column` is None for one that a constrained plane leaves out."""
+    """One component's column, and what its numbers are multiplied by: a sign, and the size of their unit.
+
+    `column` is None for one that a constrained plane leaves out.
+    """
 
     column: int | None
-    sign: float
+    factor: float
 
 
 @dataclass(frozen=True, slots=True)

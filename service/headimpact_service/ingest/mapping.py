@@ -72,19 +72,19 @@ class SignalColumns(Strict):
 class LinearAccelerationColumns(SignalColumns):
     """Columns of linear acceleration."""
 
-    unit: Literal["g", "m/s^2"] | None = None
+    unit: Literal["g", "m/s^2", "mg", "cm/s^2", "mm/s^2"] | None = None
 
 
 class AngularVelocityColumns(SignalColumns):
     """Columns of angular velocity."""
 
-    unit: Literal["rad/s", "deg/s"] | None = None
+    unit: Literal["rad/s", "deg/s", "mrad/s", "mdeg/s", "rpm"] | None = None
 
 
 class AngularAccelerationColumns(SignalColumns):
     """Columns of angular acceleration."""
 
-    unit: Literal["rad/s^2", "deg/s^2"] | None = None
+    unit: Literal["rad/s^2", "deg/s^2", "krad/s^2", "kdeg/s^2"] | None = None
 
 
 class DateAndTime(Strict):

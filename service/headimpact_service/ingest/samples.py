@@ -67,5 +67,5 @@ def _assembled(signal: SignalLayout, columns: Columns) -> FloatArray:
     for axis, component in enumerate(signal.components):
         if component.column is not None:
             with np.errstate(invalid="ignore"):  # a binary file may hold NaNs that signal
-                np.multiply(columns.numbers[component.column], component.sign, out=values[:, axis])
+                np.multiply(columns.numbers[component.column], component.factor, out=values[:, axis])
     return values

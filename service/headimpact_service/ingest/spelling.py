@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 import unicodedata
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -47,15 +48,14 @@ def _units() -> dict[str, dict[str, str]]:
     }
 
 
-@cache
-def known_units() -> frozenset[str]:
-    """Every spelling of a unit of time or of a signal, as :func:`compact` has it."""
-    return frozenset(spelling for spellings in _units().values() for spelling in spellings)
-
-
 def unit_spelled(signal: str, text: str | None) -> str | None:
     """The unit that a text names, if it is one of the signal's."""
     return None if text is None else _units()[signal].get(compact(text))
+
+
+def spellings_of(quantity: str) -> Iterator[tuple[str, list[str]]]:
+    """The units of a quantity, each with its spellings."""
+    yield from vocabulary()[quantity]["units"].items()
 
 
 @cache
@@ -73,9 +73,14 @@ def unit_ending(quantity: str, heading: str) -> str | None:
 
 def unit_at_end(quantity: str, heading: str) -> tuple[str, str] | None:
     """What stands before a unit of a quantity that ends a heading as a word of its own, and that unit."""
+    found = next(ending(heading, _written(quantity)), None)
+    return None if found is None else (found[0], found[2])
+
+
+def ending(heading: str, spellings: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str, str]]:
+    """The spellings that end a heading as a word of their own: what stands before each, it, and the unit it is of."""
     text = unicodedata.normalize("NFKC", heading[:MAX_COMPACT]).casefold().replace("^", "").rstrip(" )]")
-    for spelling, unit in _written(quantity):
+    for spelling, unit in spellings:
         rest = text.removesuffix(spelling)
         if rest != text and rest and not rest[-1].isalnum():
-            return rest, unit
-    return None
+            yield rest, spelling, unit

@@ -15,6 +15,7 @@ from headimpact.recording import TO_CRITERIA_UNIT, SignalName
 from headimpact_service.ingest.cells import is_written_number
 from headimpact_service.ingest.decimal_commas import has_comma, has_decimal_comma
 from headimpact_service.ingest.headings import Headings
+from headimpact_service.ingest.scaled_units import SCALED_UNITS
 from headimpact_service.ingest.spelling import compact, unit_ending, unit_spelled, vocabulary
 
 Kind = Literal["resultant", "peak"]
@@ -40,7 +41,8 @@ class _Words:
 def supplied_in(signal: SignalName, unit: str, column: int, headings: Headings) -> Supplied:
     """A column that is said to hold resultants or peaks of a signal: in its unit, unless the column names its own."""
     own = unit_spelled(signal, headings.units.get(column)) or unit_ending(signal, headings.written[column])
-    return Supplied(column, TO_CRITERIA_UNIT[own or unit] / TO_CRITERIA_UNIT[unit])
+    base, size = SCALED_UNITS.get(unit, (unit, 1.0))
+    return Supplied(column, size if own is None else TO_CRITERIA_UNIT[own] / TO_CRITERIA_UNIT[base])
 
 
 def spoken_in(

@@ -744,3 +744,94 @@ def test_a_resultant_that_a_mapping_names_must_be_there():
     columns = {"unit": "g", "x": "ax_g", "y": "ay_g", "z": "az_g", "resultant": "a_mag"}
     named = Mapping.model_validate({"linear_acceleration": columns, "time": {"column": "t_s", "unit": "s"}})
     assert codes(refused(csv_text(), mapping=named)) == [("/linear_acceleration/resultant", "column-missing")]
+
+
+def in_unit(
+    unit: str, written: str, signal: str = "linear_acceleration", below: str = ""
+) -> str | ImpactRecord | Problem:
+    """What becomes of three columns whose headings end in `written`, under a mapping that says `unit`."""
+    columns = [f"{axis}{written}" for axis in "XYZ"]
+    text = table(",".join(["t_ms", *columns]))
+    if below:
+        head, rows = text.split("\n", 1)
+        text = f"{head}\nms,{below},{below},{below}\n{rows}"
+    document = {
+        signal: {"unit": unit, **dict(zip("xyz", columns, strict=True))},
+        "time": {"column": "t_ms", "unit": "ms"},
+    }
+    [found] = outcome(text, mapping=mapping(document))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit", "written"),
+    [
+        ("linear_acceleration", "g", " (m/s^2)"),
+        ("linear_acceleration", "m/s^2", " [g]"),
+        ("linear_acceleration", "g", " (mg)"),
+        ("linear_acceleration", "m/s^2", " mm/s2"),
+        ("linear_acceleration", "g", " (rad/s)"),
+        ("angular_velocity", "rad/s", " (deg/s)"),
+        ("angular_velocity", "deg/s", " [mdps]"),
+        ("angular_velocity", "rad/s", " (rpm)"),
+        ("angular_acceleration", "rad/s^2", " (krad/s²)"),
+        ("angular_acceleration", "rad/s^2", " (rad/s)"),
+    ],
+)
+def test_a_mappings_unit_must_be_that_of_the_heading(signal: str, unit: str, written: str):
+    found = in_unit(unit, written, signal)
+    assert isinstance(found, Problem)
+    assert codes(found) == [(f"/{signal}/unit", "units-differ")]
+    assert f"X{written.strip()[:2]}"[:1] in found.detail
+    below = in_unit(unit, "", signal, below=written.strip(" ()[]"))
+    assert isinstance(below, Problem)
+    assert codes(below) == [(f"/{signal}/unit", "units-differ")]
+
+
+@pytest.mark.parametrize(
+    ("signal", "unit", "written", "base", "size"),
+    [
+        ("linear_acceleration", "mg", " (mg)", "g", 1e-3),
+        ("linear_acceleration", "mg", "", "g", 1e-3),
+        ("linear_acceleration", "mm/s^2", " (mm/s²)", "m/s^2", 1e-3),
+        ("linear_acceleration", "cm/s^2", " cm/s^2", "m/s^2", 1e-2),
+        ("angular_velocity", "mdeg/s", " (mdps)", "deg/s", 1e-3),
+        ("angular_velocity", "mrad/s", " (mrad/s)", "rad/s", 1e-3),
+        ("angular_velocity", "rpm", " (rpm)", "deg/s", 6.0),
+        ("angular_acceleration", "krad/s^2", " (krad/s²)", "rad/s^2", 1e3),
+        ("angular_acceleration", "kdeg/s^2", " (kdeg/s^2)", "deg/s^2", 1e3),
+        ("linear_acceleration", "g", "_axis", "g", 1.0),
+    ],
+)
+def test_a_mapping_may_name_a_sensors_own_unit(signal: str, unit: str, written: str, base: str, size: float):
+    record = in_unit(unit, written, signal)
+    assert isinstance(record, ImpactRecord), record
+    found = getattr(record.recording, signal)
+    assert found.unit == base
+    assert peaks(found) == pytest.approx([size, 2 * size, 3 * size], rel=1e-12)
+
+
+def test_a_range_and_resultants_are_in_the_sensors_own_unit():
+    rows = [
+        "0,1000,0,0,1000",
+        "1,3000,4000,0,5000",
+        "2,0,0,0,0",
+        "3,0,0,100,100",
+        *(f"{n},0,0,0,0" for n in range(4, 40)),
+    ]
+    text = "\n".join(["t_ms,X,Y,Z,R", *rows])
+    columns = {"unit": "mg", "x": "X", "y": "Y", "z": "Z", "resultant": "R", "range": 16000}
+    document = {"linear_acceleration": columns, "time": {"column": "t_ms", "unit": "ms"}}
+    record = one(text, mapping=mapping(document))
+    assert record.recording.linear_acceleration is not None
+    assert record.recording.linear_acceleration.declared_range == pytest.approx(16.0)
+    assert "vendor_peak_mismatch" not in [note.code for note in record.notes]
+
+
+@pytest.mark.parametrize(("heading", "unit"), [("Time (ms)", "us"), ("t_s", "ms"), ("Elapsed [us]", "ms")])
+def test_a_mappings_unit_of_times_must_be_that_of_the_heading(heading: str, unit: str):
+    document = {
+        "linear_acceleration": {"unit": "g", "x": "X", "y": "Y", "z": "Z"},
+        "time": {"column": heading, "unit": unit},
+    }
+    assert codes(refused(table(f"{heading},X,Y,Z"), mapping=mapping(document))) == [("/time", "units-differ")]

@@ -29,7 +29,7 @@ from headimpact_service.ingest.guarded.contents import (
     unreadable,
 )
 from headimpact_service.ingest.heading_rows import LOOK, are_units, joined
-from headimpact_service.ingest.spelling import known_units
+from headimpact_service.ingest.scaled_units import known_units
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
 
