@@ -393,3 +393,41 @@ def read_or_refused(data: bytes, **options: Any) -> list[ImpactRecord | Problem]
         return read(data, **options)
     except Problem as problem:
         return [problem]
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"lin_acc_CG_unit": "m/s^2", "ang_vel_unit": "rad/s"},
+        {"lin_acc_CG_units": "m/s^2"},
+        {"unit_lin_acc_CG": "m/s^2"},
+        {"units": "m/s^2"},
+    ],
+)
+def test_units_that_a_struct_states_are_held_against_the_preset(said: dict[str, str]):
+    values = noise(1, 100)[0]
+    fields = {"t": TIMES_S[:, None], "lin_acc_CG": values[:, :3], "ang_vel": values[:, 3:]}
+    data = mat({"impact": structs(fields | said)})
+    assert codes(refused(data, preset=PRESET)) == [("/linear_acceleration/unit", "units-differ")]
+    right = {name: text.replace("m/s^2", "g") for name, text in said.items()}
+    assert len(records(mat({"impact": structs(fields | right)}), preset=PRESET)) == 1
+
+
+def test_units_that_arrays_state_are_held_against_the_preset():
+    values = noise(2, 100)
+    arrays = {"kin": values, "kin_unit": "g; deg/s"}
+    assert codes(refused(mat(arrays), preset=PRESET)) == [("/angular_velocity/unit", "units-differ")]
+    assert len(records(mat(arrays | {"kin_unit": "g; rad/s"}), preset=PRESET)) == 2
+    mapping = {
+        "linear_acceleration": {"x": "kin_1", "y": "kin_2", "z": "kin_3"},
+        "angular_velocity": {"x": "kin_4", "y": "kin_5", "z": "kin_6"},
+        "sample_rate_hz": 1000,
+    }
+    [first, _] = records(mat(arrays), mapping=Mapping.model_validate(mapping))
+    assert [signal.unit for _, signal in first.recording.signals()] == ["g", "deg/s"]
+
+
+@pytest.mark.parametrize("behind", [b"\0" * 100, b"x" * 100, bytes(range(1, 101))])
+def test_what_stands_behind_the_variables_is_named(behind: bytes):
+    problem = refused(mat({"hit": noise(1, 100)[0]}) + behind, preset=PRESET)
+    assert problem.detail == "Behind a variable of the MATLAB file stands what is none: the file is broken."

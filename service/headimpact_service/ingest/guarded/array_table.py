@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from headimpact_service.ingest.guarded.contents import checked_headings, unreadable
+from headimpact_service.ingest.guarded.stated_units import of_columns
 from headimpact_service.ingest.table import Columns, FloatArray
 
 ROWS_AT_ONCE = 16_384
@@ -55,14 +56,14 @@ class ArrayTable:
     dated = frozenset[int]()
     above: Sequence[Sequence[str]] = ()
 
-    def __init__(self, samples: Sequence[Samples], facts: Sequence[Fact], units: dict[str, str]) -> None:
-        """Samples with times first, so that a signal's own times stand before it; `units` by the array's name."""
+    def __init__(self, samples: Sequence[Samples], facts: Sequence[Fact], units: Mapping[str, str]) -> None:
+        """Samples with times first, so that a signal's own times stand before it; `units` are texts by their names."""
         self._samples, self._facts = list(samples), list(facts)
         self._columns = [(array, part) for array in self._samples for part in range(array.width)]
         self.wordless = range(len(self._columns))
         named = [heading for array in self._samples for heading in array.headings]
         self.headings = checked_headings([*named, *(fact.name for fact in self._facts)])
-        self.units = {place: units[array.name] for place, (array, _) in enumerate(self._columns) if array.name in units}
+        self.units = of_columns([(array.name, part) for array, part in self._columns], units)
         self._impacts = max((array.impacts for array in self._samples), default=0)
         if any(array.impacts != self._impacts for array in self._samples):
             raise unreadable("The arrays of samples differ in their number of impacts.")

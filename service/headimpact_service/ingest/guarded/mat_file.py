@@ -25,6 +25,7 @@ from headimpact_service.ingest.guarded.mat_struct import (
     holds_samples,
     text_of,
 )
+from headimpact_service.ingest.guarded.stated_units import unit_of
 from headimpact_service.ingest.table import FloatArray
 
 MAX_INFLATED = 32 * 1024 * 1024
@@ -35,7 +36,7 @@ _FEW = 8
 ALONE = "array"
 """The other name of an array that is the only one."""
 _HEADER = 128
-_COMPRESSED = 15
+_MATRIX, _COMPRESSED = 14, 15
 _BLOCK = 64 * 1024
 
 
@@ -135,6 +136,8 @@ def _require_small(stream: BinaryIO) -> None:
         if len(tag) < 8:
             return
         kind, size = int.from_bytes(tag[:4], order), int.from_bytes(tag[4:], order)
+        if kind not in {_MATRIX, _COMPRESSED}:
+            raise unreadable("Behind a variable of the MATLAB file stands what is none: the file is broken.")
         total += _inflated(stream, size, MAX_INFLATED - total) if kind == _COMPRESSED else _passed(stream, size)
         if total > MAX_INFLATED:
             raise unreadable(f"The variables of a MATLAB file may have at most {MAX_INFLATED} bytes: split the file.")
@@ -188,7 +191,9 @@ def _arrays(variables: dict[str, Any]) -> ArrayTable:
         for name, value in variables.items()
         if name not in shared and (texts := _texts_of(value, impacts))
     ]
-    return ArrayTable([*clocks, *samples], facts, {})
+    texts = {fact.name: fact.texts[0] for fact in facts}
+    of_alone = (text for name, text in texts.items() if unit_of(name) == next(iter(solid)).lower())
+    return ArrayTable([*clocks, *samples], facts, texts | {f"{ALONE}_unit": text for text in of_alone})
 
 
 def _is_row(value: AnyArray) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from headimpact_service.ingest.cells import number_text
 from headimpact_service.ingest.guarded.array_table import AXES, MAX_LENGTH, ROWS_AT_ONCE
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
+from headimpact_service.ingest.guarded.stated_units import of_columns
 from headimpact_service.ingest.table import Columns, FloatArray
 
 MAX_FIELDS = 100
@@ -28,7 +29,6 @@ class StructTable:
     parted = True
     dated = frozenset[int]()
     above: Sequence[Sequence[str]] = ()
-    units: dict[int, str] = {}  # noqa: RUF012 - a MATLAB file says none
 
     def __init__(self, impacts: Sequence[dict[str, Any]]) -> None:
         """Look at every field once."""
@@ -43,6 +43,10 @@ class StructTable:
                 headings.append(heading)
                 self._columns.append((name, part))
         self.headings = checked_headings(headings)
+        texts = {name: text_of(impacts[0].get(name)) for name in names} if impacts else {}
+        parts = [(name, -1 if part is None else part) for name, part in self._columns]
+        units = of_columns(parts, {name: text for name, text in texts.items() if text})
+        self.units = {place: unit for place, unit in units.items() if parts[place][1] >= 0}
         self.wordless = [place for place, (_, part) in enumerate(self._columns) if part is not None]
 
     def has_samples(self, place: int) -> bool:

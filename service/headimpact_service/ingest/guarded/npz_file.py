@@ -14,10 +14,10 @@ import numpy as np
 from headimpact_service.ingest.cells import number_text
 from headimpact_service.ingest.guarded.array_table import AXES, ArrayTable, Fact, Samples
 from headimpact_service.ingest.guarded.contents import MAX_TEXT, Content, NamedTable, checked_text, unreadable
+from headimpact_service.ingest.guarded.stated_units import unit_of
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
 
-UNIT = "_unit"
 SUFFIX = ".npy"
 MAX_HEADER = 4096
 MAX_FACTS = 16 * 1024 * 1024
@@ -46,14 +46,14 @@ class _Member:
     @property
     def is_unit(self) -> bool:
         """Whether it says the unit of another array."""
-        return self.is_text and self.shape == () and self.name.endswith(UNIT)
+        return self.is_text and self.shape == () and unit_of(self.name) is not None
 
 
 def contents(stream: BinaryIO) -> Iterator[Content]:
     """All arrays of the archive as one table."""
     archive = GuardedZip(stream)
     members = [_member(archive, name) for name in archive.names]
-    units = {m.name.removesuffix(UNIT): _texts(archive, m)[0] for m in members if m.is_unit}
+    units = {member.name: _texts(archive, member)[0] for member in members if member.is_unit}
     yield NamedTable(None, _table(archive, [member for member in members if not member.is_unit], units))
 
 
