@@ -191,9 +191,9 @@ def _arrays(variables: dict[str, Any]) -> ArrayTable:
         for name, value in variables.items()
         if name not in shared and (texts := _texts_of(value, impacts))
     ]
-    texts = {fact.name: fact.texts[0] for fact in facts}
-    of_alone = (text for name, text in texts.items() if unit_of(name) == next(iter(solid)).lower())
-    return ArrayTable([*clocks, *samples], facts, texts | {f"{ALONE}_unit": text for text in of_alone})
+    units = {fact.name: fact.texts[0] for fact in facts}
+    of_alone = (text for name, text in units.items() if unit_of(name) == next(iter(solid)).lower())
+    return ArrayTable([*clocks, *samples], facts, units | {f"{ALONE}_unit": text for text in of_alone})
 
 
 def _is_row(value: AnyArray) -> bool:

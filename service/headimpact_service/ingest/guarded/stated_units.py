@@ -6,9 +6,12 @@ import re
 from collections.abc import Mapping, Sequence
 
 from headimpact.recording import AXES
+from headimpact_service.ingest.spelling import words_of
 
 _ALONE = frozenset({"unit", "units"})
 _BEHIND, _BEFORE = ("_unit", "_units"), ("unit_", "units_")
+_TURNING = frozenset({"ang", "angular", "rot", "rotational", "gyr", "gyro", "omega", "w", "av", "alpha"})
+_OF_TURNS = re.compile("rad|deg|dps|°", re.IGNORECASE)
 _PARTED = re.compile(r"\s*[;,|]\s*")
 
 
@@ -21,12 +24,19 @@ def of_columns(columns: Sequence[tuple[str, int]], texts: Mapping[str, str]) -> 
     widths = {name: 1 + max(part for of, part in columns if of == name) for name, _ in columns}
     found: dict[int, str] = {}
     for place, (name, part) in enumerate(columns):
-        units = _PARTED.split(said.get(name.lower(), said.get("", "")))
+        own = said.get(name.lower())
+        units = _PARTED.split(_shared(name, said.get("", "")) if own is None else own)
         if len(units) == 1 and units[0]:
             found[place] = units[0]
         elif len(units) == 2 and widths[name] == 2 * len(AXES):
             found[place] = units[part // len(AXES)]
     return found
+
+
+def _shared(name: str, unit: str) -> str:
+    """A unit that is said of no array, for those that it may be of: of turns or not."""
+    turns = not _TURNING.isdisjoint(words_of(name))
+    return unit if ";" in unit or turns == (_OF_TURNS.search(unit) is not None) else ""
 
 
 def unit_of(text: str) -> str | None:
