@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 from pydantic_core import from_json
 
+from headimpact.recording import SIGNALS
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.impact_json import MAX_NAME, FileImpactBody
+from headimpact_service.ingest.impact_json import MAX_NAME, FileImpactBody, Kinematics, SignalBody
 from headimpact_service.ingest.impact_reading import to_record
 from headimpact_service.ingest.json_faults import require_bounded, validated
 from headimpact_service.ingest.json_items import items
@@ -56,7 +57,18 @@ def read_impact_text(text: bytes, options: ImportOptions, what: str) -> ImpactRe
     except Problem as problem:
         raise Problem("unreadable-file", problem.detail) from None
     body = validated(text, FileImpactBody, what=what)
+    _complete(body.kinematics, options)
     return with_options(to_record(body, time_zone=options.time_zone, what=what), options)
+
+
+def _complete(kinematics: Kinematics, options: ImportOptions) -> None:
+    """Put in what a signal needs and the sender says beside the file: a rate where it has no times, filled gaps."""
+    if options.fill_gaps:
+        kinematics.fill_gaps = True
+    for name in SIGNALS if options.sample_rate_hz is not None else ():
+        signal: SignalBody | None = getattr(kinematics, name)
+        if signal is not None and signal.sample_rate_hz is None and signal.time_ms is None:
+            signal.sample_rate_hz = options.sample_rate_hz
 
 
 def sent_name(text: bytes) -> str | None:

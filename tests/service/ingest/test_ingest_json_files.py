@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from ingest_files import body, codes, encoded, one, outcome, read, refused, statuses
 
 from headimpact.cut_offs import NO_FILTER
+from headimpact.preparation import prepare
 from headimpact_service.errors import Problem
 from headimpact_service.ingest import json_format, ndjson_format
 from headimpact_service.ingest.digest import content_digest
@@ -274,3 +275,20 @@ def test_any_value_anywhere_is_read_or_refused(steps: list[str], value: Any):
     items = outcome(json.dumps([document]))
     assert len(items) == 1
     assert statuses(items) <= {422}
+
+
+def test_what_a_signal_lacks_may_be_said_beside_the_file():
+    sent = body()
+    for name in ("linear_acceleration", "angular_velocity"):
+        for field in ("sample_rate_hz", "time_ms"):
+            sent["kinematics"][name].pop(field, None)
+    problem = refused(encoded(sent))
+    assert problem.status == 422
+    rates = {signal.sample_rate_hz for _, signal in one(encoded(sent), sample_rate_hz=2000.0).recording.signals()}
+    assert rates == {2000.0}
+    gap = body()
+    gap["kinematics"]["linear_acceleration"]["x"][5] = None
+    assert "fill_gaps" in refused(encoded(gap)).errors[0].detail
+    filled = one(encoded(gap), fill_gaps=True).recording
+    assert filled.fill_gaps
+    assert "gaps_filled" in [note.code for note in prepare(filled).notes]
