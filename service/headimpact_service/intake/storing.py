@@ -49,6 +49,7 @@ def _new(
         context=rest or None,
         key_id=key_id,
         seen=seen,
+        mounted_by_device=scored.sent_digest != scored.input_digest,
     )
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import BindParameter, Connection, bindparam, delete, select, update
+from sqlalchemy import BindParameter, Connection, bindparam, delete, insert, select, update
 
 from headimpact_service.store import jobs
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
-from headimpact_service.store.impact_rows import deleted_content
+from headimpact_service.store.impact_rows import former_content
 from headimpact_service.store.many import in_parts
-from headimpact_service.store.tables import impact_revisions, impacts, labels, scores
+from headimpact_service.store.tables import former_contents, impact_revisions, impacts, labels, scores
 
 _NOTHING = {
     column.name: None
@@ -23,8 +23,10 @@ _ENTOMB = update(impacts).where(
 )
 _IDS: BindParameter[Any] = bindparam("impact_ids", expanding=True)
 _DELIVERED = select(impact_revisions.c.impact_id, impact_revisions.c.content_digest).where(
-    impact_revisions.c.impact_id.in_(_IDS), impact_revisions.c.revision == 1
+    impact_revisions.c.impact_id.in_(_IDS)
 )
+_FORGET = delete(former_contents).where(former_contents.c.impact_id == bindparam("impact"))
+_FORGET_ONE = _FORGET.where(former_contents.c.digest == bindparam("of_digest"))
 _CONTENTS = [
     delete(table).where(table.c.impact_id == bindparam("impact")) for table in (labels, scores, impact_revisions)
 ]
@@ -35,21 +37,27 @@ _REVISION = [
 _NAMES = select(impacts.c.external_id).where(
     impacts.c.athlete_id == bindparam("athlete_id"), impacts.c.external_id.is_not(None)
 )
-_MOVED = select(impact_revisions.c.impact_id, impact_revisions.c.revision).where(
-    impact_revisions.c.athlete_id == bindparam("athlete_id"), impact_revisions.c.superseded_at.is_not(None)
-)
+_MOVED = select(
+    impact_revisions.c.impact_id,
+    impact_revisions.c.revision,
+    impact_revisions.c.data_set_id,
+    impact_revisions.c.content_digest,
+).where(impact_revisions.c.athlete_id == bindparam("athlete_id"), impact_revisions.c.superseded_at.is_not(None))
 
 
 def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes], *, external_ids: bool) -> None:
     """Delete the traces, scores, labels and revisions of impacts and all they say; with `external_ids` their names too.
 
     The athlete's id stays, so that whoever follows one athlete's list sees the tombstone, and so does the digest of
-    the external id, so that a redelivery does not bring the impact back; where the names stay, also one of what was
+    the external id, so that a redelivery does not bring the impact back; where the names stay, also those of what was
     delivered.
     """
     if not impact_ids:
         return
-    delivered = {} if external_ids else _delivered(conn, data_set_id, impact_ids)
+    if external_ids:
+        conn.execute(_FORGET, [{"impact": impact_id} for impact_id in impact_ids])
+    else:
+        remember(conn, data_set_id, impact_ids)
     for statement in _CONTENTS:
         conn.execute(statement, [{"impact": impact_id} for impact_id in impact_ids])
     first = next_change(conn, impacts, data_set_id)
@@ -58,20 +66,19 @@ def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes],
     for number, impact_id in enumerate(impact_ids):
         now = first + number * MICROSECOND
         tombs.append(
-            nothing
-            | {"of_data_set": data_set_id, "impact_id": impact_id, "updated_at": now, "deleted_at": now}
-            | {"deleted_content": delivered.get(impact_id)}
+            nothing | {"of_data_set": data_set_id, "impact_id": impact_id, "updated_at": now, "deleted_at": now}
         )
     conn.execute(_ENTOMB.values(revision=impacts.c.revision + 1), tombs)
 
 
-def _delivered(conn: Connection, data_set_id: bytes, impact_ids: list[bytes]) -> dict[bytes, bytes]:
-    """What each tombstone keeps of the impact as it was delivered first."""
-    found: dict[bytes, bytes] = {}
+def remember(conn: Connection, data_set_id: bytes, impact_ids: list[bytes]) -> None:
+    """Keep what tells each content that impacts have, or had before they were corrected, from any other."""
+    conn.execute(_FORGET, [{"impact": impact_id} for impact_id in impact_ids])
     for part in in_parts(impact_ids):
-        for impact_id, content_digest in conn.execute(_DELIVERED, {"impact_ids": part}):
-            found[impact_id] = deleted_content(data_set_id, content_digest)
-    return found
+        delivered = conn.execute(_DELIVERED, {"impact_ids": part}).all()
+        kept = {(former_content(data_set_id, content), impact_id) for impact_id, content in delivered}
+        rows = [{"data_set_id": data_set_id, "digest": digest, "impact_id": of} for digest, of in sorted(kept)]
+        conn.execute(insert(former_contents), rows)
 
 
 def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> None:
@@ -86,10 +93,16 @@ def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: byt
     known = conn.execute(mine.where(impacts.c.deleted_at.is_(None))).scalars().all()
     erase_impacts(conn, data_set_id, list(known), external_ids=True)
     # Those deleted one by one before kept their external ids, and what they were known by.
-    conn.execute(
-        update(impacts).where(impacts.c.athlete_id == athlete_id).values(external_id=None, deleted_content=None)
-    )
+    conn.execute(update(impacts).where(impacts.c.athlete_id == athlete_id).values(external_id=None))
+    conn.execute(delete(former_contents).where(former_contents.c.impact_id.in_(mine)))
     moved = conn.execute(_MOVED, {"athlete_id": athlete_id}).all()
     if moved:
         for statement in _REVISION:
-            conn.execute(statement, [{"impact": impact, "number_of_revision": number} for impact, number in moved])
+            conn.execute(statement, [{"impact": row.impact_id, "number_of_revision": row.revision} for row in moved])
+        conn.execute(
+            _FORGET_ONE,
+            [
+                {"impact": row.impact_id, "of_digest": former_content(row.data_set_id, row.content_digest)}
+                for row in moved
+            ],
+        )

@@ -20,9 +20,9 @@ from headimpact_service.store import impacts as impact_store
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.impact_inserts import first_row, insert_rows
-from headimpact_service.store.impact_rows import NewImpact, deleted_content, external_id_digest
+from headimpact_service.store.impact_rows import NewImpact, external_id_digest, former_content
 from headimpact_service.store.many import ASKED_AT_ONCE, in_parts
-from headimpact_service.store.tables import athletes, devices, impacts
+from headimpact_service.store.tables import athletes, devices, former_contents, impacts
 
 T = TypeVar("T")
 
@@ -38,12 +38,15 @@ class Added:
 
 _DATA_SET_PARAMETER: BindParameter[bytes] = bindparam("data_set_id")
 _ASKED: BindParameter[Any] = bindparam("asked", expanding=True)
-_NAMES, _CONTENTS, _DELETED = (
-    select(digest).where(impacts.c.data_set_id == _DATA_SET_PARAMETER, digest.in_(_ASKED)).limit(bindparam("most"))
-    for digest in (impacts.c.external_id_digest, impacts.c.input_digest, impacts.c.deleted_content)
+_NAMES, _CONTENTS, _FORMER = (
+    select(digest).where(digest.table.c.data_set_id == _DATA_SET_PARAMETER, digest.in_(_ASKED)).limit(bindparam("most"))
+    for digest in (impacts.c.external_id_digest, impacts.c.input_digest, former_contents.c.digest)
 )
 _ATHLETES = select(athletes.c.external_id, func.coalesce(athletes.c.merged_into, athletes.c.id)).where(
     athletes.c.data_set_id == _DATA_SET_PARAMETER, athletes.c.external_id.in_(_ASKED)
+)
+_CHANGED_DEVICES = select(devices.c.serial).where(
+    devices.c.data_set_id == _DATA_SET_PARAMETER, devices.c.serial.in_(_ASKED), devices.c.revision > 1
 )
 _DEVICES = select(devices.c.serial, devices.c.id).where(
     devices.c.data_set_id == _DATA_SET_PARAMETER, devices.c.serial.in_(_ASKED)
@@ -76,16 +79,28 @@ def _perhaps_known(conn: Connection, data_set_id: bytes, news: Sequence[NewImpac
     contents = [new.input_digest for new in news]
     known_names = _known(conn, data_set_id, _NAMES, names)
     known_contents = _known(conn, data_set_id, _CONTENTS, contents)
-    deliveries = [deleted_content(data_set_id, new.content_digest) for new in news]
-    deleted = _known(conn, data_set_id, _DELETED, deliveries)
+    deliveries = [former_content(data_set_id, new.content_digest) for new in news]
+    former = _known(conn, data_set_id, _FORMER, deliveries)
+    remounted = _remounted(conn, data_set_id, news)
     return {
         index
         for index, new in enumerate(news)
         if new.athlete_id is not None
         or names[index] in known_names
         or contents[index] in known_contents
-        or deliveries[index] in deleted
+        or deliveries[index] in former
+        or (new.mounted_by_device and new.device_serial in remounted)
     }
+
+
+def _remounted(conn: Connection, data_set_id: bytes, news: Sequence[NewImpact]) -> set[str | None]:
+    """The devices that say where their sensor sits and whose page was changed since it was made."""
+    serials = dict.fromkeys(new.device_serial for new in news if new.mounted_by_device)
+    found: set[str | None] = set()
+    for part in in_parts(serials):
+        asked = {"data_set_id": data_set_id, "asked": part}
+        found.update(conn.execute(_CHANGED_DEVICES, asked).scalars())
+    return found
 
 
 def _known(conn: Connection, data_set_id: bytes, query: Select[Any], digests: Sequence[bytes | None]) -> set[bytes]:

@@ -38,7 +38,6 @@ def first_row(
         "created_at": now,
         "updated_at": now,
         "deleted_at": None,
-        "deleted_content": None,
     }
 
 

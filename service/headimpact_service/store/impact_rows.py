@@ -63,6 +63,8 @@ class NewImpact:
     context: Mapping[str, Any] | None = None
     key_id: bytes | None = None
     seen: Seen | None = None
+    mounted_by_device: bool = False
+    """Whether the page of its device says where the sensor sits: then `input_digest` covers that, too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,6 +178,6 @@ def external_id_digest(data_set_id: bytes, external_id: str | None) -> bytes | N
     return blake2b(external_id.encode(), key=data_set_id, digest_size=16).digest()
 
 
-def deleted_content(data_set_id: bytes, content_digest: bytes) -> bytes:
-    """What a tombstone keeps of its content: who has the content can tell that it was there, and nobody else."""
+def former_content(data_set_id: bytes, content_digest: bytes) -> bytes:
+    """What is kept of a former content: who has the content can tell that it was there, and nobody else."""
     return blake2b(content_digest, key=data_set_id, digest_size=16).digest()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import BindParameter, Connection, bindparam, select, update
+from sqlalchemy import BindParameter, Connection, and_, bindparam, select, update
 
 from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import athletes as athlete_store
@@ -34,14 +34,14 @@ from headimpact_service.store.impact_rows import (
     Outcome,
     Revision,
     ScoreOutdated,
-    deleted_content,
     external_id_digest,
+    former_content,
 )
 from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.revision import require_revision
 from headimpact_service.store.score_rows import stored
 from headimpact_service.store.scores import next_number
-from headimpact_service.store.tables import impact_revisions, impacts
+from headimpact_service.store.tables import former_contents, impact_revisions, impacts
 
 __all__ = [
     "Impact",
@@ -73,12 +73,32 @@ _SAME_EVENT = Prepared(
     )
     .limit(1)
 )
-_DELETED = Prepared(
+_SAME_DELIVERY = Prepared(
     select(impacts.c.id)
-    .where(impacts.c.data_set_id == _DATA_SET, impacts.c.deleted_content == bindparam("deleted_content"))
+    .join(
+        impact_revisions,
+        and_(impact_revisions.c.impact_id == impacts.c.id, impact_revisions.c.revision == impacts.c.revision),
+    )
+    .where(
+        impacts.c.data_set_id == _DATA_SET,
+        impacts.c.athlete_id.is_not_distinct_from(bindparam("athlete_id")),
+        impacts.c.occurred_at.is_not_distinct_from(bindparam("occurred_at")),
+        impact_revisions.c.content_digest == bindparam("content_digest"),
+    )
     .limit(1)
 )
-_INTERNAL = frozenset({"data_set_id", "external_id_digest", "score_number", "deleted_content"})
+_FORMER = Prepared(
+    select(impacts.c.id, impacts.c.deleted_at)
+    .join(former_contents, former_contents.c.impact_id == impacts.c.id)
+    .where(
+        impacts.c.data_set_id == _DATA_SET,
+        former_contents.c.data_set_id == _DATA_SET,
+        former_contents.c.digest == bindparam("former_content"),
+    )
+    .order_by(impacts.c.deleted_at.is_not(None))
+    .limit(1)
+)
+_INTERNAL = frozenset({"data_set_id", "external_id_digest", "score_number"})
 _UPDATE = update(impacts).where(impacts.c.data_set_id == bindparam("of_data_set"), impacts.c.id == bindparam("impact"))
 _SUPERSEDE = update(impact_revisions).where(
     impact_revisions.c.impact_id == bindparam("impact"), impact_revisions.c.revision == bindparam("before")
@@ -92,18 +112,15 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
     `external-id-conflict` problem, and `impact-deleted` after a deletion. An athlete id that is none of the data set's
     is a `not-found` problem, and a score that was made under what has changed since is :class:`ScoreOutdated`. With
     `same_event_is_unchanged` (imports), an impact of the same athlete, instant and input is `unchanged` too, under
-    whatever name that is not taken, and what was deleted does not come back.
+    whatever name that is not taken, and so is what was corrected since; what was deleted does not come back.
     """
     known = look_up(conn, data_set_id, new)
     if known.same_external_id is not None:
         return _redelivery(conn, data_set_id, new, known, known.same_external_id)
-    if same_event_is_unchanged and known.same_content is not None:
-        same = _same_event(conn, data_set_id, new, known)
-        if same is not None:
-            _require_same_marks(new, same)
-            return Outcome("unchanged", same)
-    if same_event_is_unchanged and _was_deleted(conn, data_set_id, new):
-        raise Problem("impact-deleted", "This impact was deleted; to store it again, send it to POST /v1/impacts.")
+    if same_event_is_unchanged:
+        there = _same_event(conn, data_set_id, new, known) or _former(conn, data_set_id, new)
+        if there is not None:
+            return Outcome("unchanged", there)
     _require_present(new, known)
     return Outcome("created", _insert(conn, data_set_id, new, known))
 
@@ -115,18 +132,26 @@ def _require_present(new: NewImpact, known: Known) -> None:
 
 
 def _same_event(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known) -> Impact | None:
-    """The stored impact of the same athlete, instant and input."""
+    """The stored impact of the same athlete, instant and input, or delivered just so before its device was remounted.
+
+    Raises
+    ------
+    Problem
+        409 `conflict` where it says otherwise whether it is valid, or whether the device was worn.
+    """
+    if known.same_content is None and not new.mounted_by_device:
+        return None
     athlete_id = known.athlete
     if athlete_id is None and new.athlete_external_id is not None:
         return None  # an athlete never seen before has no impacts
-    parameters = {
-        "data_set_id": data_set_id,
-        "input_digest": new.input_digest,
-        "athlete_id": athlete_id,
-        "occurred_at": new.occurred_at,
-    }
-    found = _SAME_EVENT.first(conn, parameters)
-    return None if found is None else get(conn, data_set_id, found[0])
+    parameters = {"data_set_id": data_set_id, "athlete_id": athlete_id, "occurred_at": new.occurred_at}
+    found = _SAME_EVENT.first(conn, parameters | {"input_digest": new.input_digest})
+    if found is None and new.mounted_by_device:
+        found = _SAME_DELIVERY.first(conn, parameters | {"content_digest": new.content_digest})
+    same = None if found is None else get(conn, data_set_id, found[0])
+    if same is not None:
+        _require_same_marks(new, same)
+    return same
 
 
 def _require_same_marks(new: NewImpact, present: Impact) -> None:
@@ -143,10 +168,15 @@ def _require_same_marks(new: NewImpact, present: Impact) -> None:
         )
 
 
-def _was_deleted(conn: Connection, data_set_id: bytes, new: NewImpact) -> bool:
-    """Whether an impact that was delivered just so was deleted."""
-    digest = deleted_content(data_set_id, new.content_digest)
-    return _DELETED.first(conn, {"data_set_id": data_set_id, "deleted_content": digest}) is not None
+def _former(conn: Connection, data_set_id: bytes, new: NewImpact) -> Impact | None:
+    """The impact that was delivered just so and was corrected since; 409 `impact-deleted` where it was deleted."""
+    digest = former_content(data_set_id, new.content_digest)
+    found = _FORMER.first(conn, {"data_set_id": data_set_id, "former_content": digest})
+    if found is None:
+        return None
+    if found[1] is not None:
+        raise Problem("impact-deleted", "This impact was deleted; to store it again, send it to POST /v1/impacts.")
+    return get(conn, data_set_id, found[0])
 
 
 def _redelivery(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known, impact_id: bytes) -> Outcome:
@@ -236,6 +266,7 @@ def correct(
     }
     conn.execute(_UPDATE, changed | {"of_data_set": data_set_id, "impact": impact_id})
     conn.execute(_SUPERSEDE, {"impact": impact_id, "before": present.revision, "superseded_at": now})
+    erasure.remember(conn, data_set_id, [impact_id])
     insert_revisions(conn, [(new, changed | {"data_set_id": data_set_id, "id": impact_id})])
     labels.withdraw_of_another(conn, data_set_id, impact_id, new.key_id)
     return Outcome("corrected", _require(conn, data_set_id, impact_id))

@@ -171,20 +171,22 @@ impacts = Table(
     Column("created_at", Instant, nullable=False),
     Column("updated_at", Instant, nullable=False),
     Column("deleted_at", Instant),
-    # Of a tombstone, a digest of what was delivered: a file that brings the same again does not bring it back.
-    Column("deleted_content", LargeBinary(16)),
     UniqueConstraint("data_set_id", "external_id_digest"),
     Index(None, "data_set_id", "updated_at", "id"),
     Index(None, "data_set_id", "input_digest", "id"),
     Index(None, "athlete_id", "occurred_at", "id"),
     sqlite_with_rowid=False,
 )
-Index(
-    "ix_impacts_data_set_id_deleted_content",
-    impacts.c.data_set_id,
-    impacts.c.deleted_content,
-    sqlite_where=impacts.c.deleted_content.is_not(None),
-    postgresql_where=impacts.c.deleted_content.is_not(None),
+
+# Digests of what was delivered and is no longer an impact's present content, since it was corrected or deleted: a file
+# that brings the same again brings nothing new.
+former_contents = Table(
+    "former_contents",
+    metadata,
+    Column("data_set_id", ForeignKey("data_sets.id"), primary_key=True),
+    Column("digest", LargeBinary(16), primary_key=True),
+    Column("impact_id", Identifier, primary_key=True, index=True),
+    sqlite_with_rowid=False,
 )
 
 impact_revisions = Table(

@@ -14,7 +14,7 @@ from headimpact_service.store.athletes import AthleteFields
 from headimpact_service.store.database import Database
 from headimpact_service.store.devices import DeviceFields
 from headimpact_service.store.impacts import Impact, ImpactFilters, NewImpact, Outcome
-from headimpact_service.store.tables import impacts as impact_table
+from headimpact_service.store.tables import former_contents
 
 
 def add(database: Database, data_set: bytes, new: NewImpact, **options: bool) -> Outcome:
@@ -69,9 +69,11 @@ class TestErase:
     def test_nothing_stays_by_which_an_erased_athletes_content_is_known(self, database, data_set, make_impact) -> None:
         before, later = (add(database, data_set, make_impact(word, external_id=word)).impact for word in "ab")
         database.write(lambda conn: impacts.delete(conn, data_set, before.id))
-        kept = select(func.count()).select_from(impact_table).where(impact_table.c.deleted_content.is_not(None))
+        corrected = make_impact("c", external_id="b")
+        database.write(lambda conn: impacts.correct(conn, data_set, later.id, corrected))
+        kept = select(func.count()).select_from(former_contents)
         with database.read() as conn:
-            assert conn.execute(kept).scalar() == 1
+            assert conn.execute(kept).scalar() == 2
         database.write(lambda conn: athletes.erase(conn, data_set, later.athlete_id))
         with database.read() as conn:
             assert conn.execute(kept).scalar() == 0
@@ -85,6 +87,7 @@ class TestErase:
         with database.read() as conn:
             assert [each.revision for each in impacts.revisions(conn, data_set, first.id)] == [2]
             assert scores.list_all(conn, data_set, first.id) == [present.score]
+            assert conn.execute(select(func.count()).select_from(former_contents)).scalar() == 0
 
     def test_many_impacts_get_as_many_instants(self, database, data_set, make_impact) -> None:
         made = [add(database, data_set, make_impact(external_id=str(number))).impact for number in range(20)]

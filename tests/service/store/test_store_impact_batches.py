@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
 import pytest
 
 from headimpact_service.errors import Problem
-from headimpact_service.store import athletes, impact_batches, impacts, many, organisations
+from headimpact_service.store import athletes, devices, impact_batches, impacts, many, organisations
 from headimpact_service.store.athletes import AthleteFields
 from headimpact_service.store.database import Database
+from headimpact_service.store.devices import DeviceFields
 from headimpact_service.store.impact_batches import Added, add_many
 from headimpact_service.store.impacts import NewImpact
 
@@ -109,6 +111,9 @@ def test_together_and_one_by_one_are_the_same(database: Database, make_impact: M
                     rows = impacts.page(conn, data_set).rows
                 named = sorted((row for row in rows if row.external_id), key=lambda row: row.external_id or "")
                 unnamed = [row for row in rows if not row.external_id]
+                for number, changed in enumerate(named[1:3]):
+                    anew = make_impact(f"corrected {number}", external_id=changed.external_id)
+                    database.write(lambda conn, d=data_set, i=changed.id, n=anew: impacts.correct(conn, d, i, n))
                 for gone in (*named[:1], *unnamed):
                     database.write(lambda conn, d=data_set, i=gone.id: impacts.delete(conn, d, i))
             news = [replace(new, external_id=None) for new in news]
@@ -116,6 +121,18 @@ def test_together_and_one_by_one_are_the_same(database: Database, make_impact: M
             alone = database.write(lambda conn, news=news: one_by_one(conn, data_sets[1], news))
             assert told(together) == told(alone)
             assert any(isinstance(item, Problem) and item.slug == "impact-deleted" for item in together)
+
+
+def test_a_device_that_is_mounted_anew_is_looked_at_one_by_one(
+    database: Database, data_set: bytes, make_impact: Make
+) -> None:
+    mounted = {"external_id": None, "device_serial": "mg-1", "mounted_by_device": True}
+    news = [make_impact(f"content {number}", **mounted) for number in range(5)]
+    first = database.write(lambda conn: add_many(conn, data_set, news))
+    database.write(lambda conn: devices.put(conn, data_set, "mg-1", DeviceFields(maker="M")))
+    anew = [replace(new, input_digest=sha256(new.input_digest).digest()) for new in news]
+    again = database.write(lambda conn: add_many(conn, data_set, anew))
+    assert [(item.status, item.id) for item in again] == [("unchanged", item.id) for item in first]
 
 
 def test_what_is_stored_together_changes_at_instants_of_its_own(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from hashlib import sha256
 
 import pytest
 from sqlalchemy import func, select
@@ -253,6 +255,49 @@ class TestDelete:
         with pytest.raises(Problem) as caught:
             database.write(lambda conn: impacts.delete(conn, data_set, first.id))
         assert caught.value.slug == "not-found"
+
+
+class TestFormerContent:
+    """A file that brings what was corrected or deleted since brings nothing new."""
+
+    def bring(self, database: Database, data_set: bytes, new: NewImpact) -> Outcome:
+        return database.write(lambda conn: impacts.add(conn, data_set, new, same_event_is_unchanged=True))
+
+    def correct(self, database: Database, data_set: bytes, impact: Impact, new: NewImpact) -> Impact:
+        return database.write(lambda conn: impacts.correct(conn, data_set, impact.id, new)).impact
+
+    def test_what_was_corrected_is_unchanged(self, database, data_set, make_impact) -> None:
+        nameless = {"external_id": None}
+        first, second = (self.bring(database, data_set, make_impact(word, **nameless)).impact for word in "ab")
+        once = self.correct(database, data_set, first, make_impact("c", **nameless, athlete_external_id="p-9"))
+        twice = self.correct(database, data_set, once, make_impact("d", **nameless, athlete_external_id="p-9"))
+        for word in "acd":
+            athlete = {} if word == "a" else {"athlete_external_id": "p-9"}
+            found = self.bring(database, data_set, make_impact(word, **nameless, **athlete))
+            assert found == Outcome("unchanged", twice), word
+        assert self.bring(database, data_set, make_impact("b", **nameless)) == Outcome("unchanged", second)
+
+    def test_what_was_corrected_and_then_deleted_does_not_come_back(self, database, data_set, make_impact) -> None:
+        first = self.bring(database, data_set, make_impact("a", external_id=None)).impact
+        self.correct(database, data_set, first, make_impact("c", external_id=None))
+        database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        for word in "ac":
+            with pytest.raises(Problem) as caught:
+                self.bring(database, data_set, make_impact(word, external_id=None))
+            assert caught.value.slug == "impact-deleted"
+        assert add(database, data_set, make_impact("a", external_id=None)).status == "created"
+        assert self.bring(database, data_set, make_impact("a", external_id=None)).status == "unchanged"
+
+    def test_a_device_that_is_mounted_anew_makes_no_new_impacts(self, database, data_set, make_impact) -> None:
+        mounted = {"external_id": None, "mounted_by_device": True}
+        sent = make_impact("a", **mounted)
+        first = self.bring(database, data_set, sent).impact
+        anew = replace(sent, input_digest=sha256(b"mounted anew").digest())
+        assert self.bring(database, data_set, anew) == Outcome("unchanged", first)
+        elsewhere = replace(anew, occurred_at=datetime(2026, 1, 2, tzinfo=UTC))
+        assert self.bring(database, data_set, elsewhere).status == "created"
+        other = replace(anew, content_digest=sha256(b"other").digest(), input_digest=sha256(b"and input").digest())
+        assert self.bring(database, data_set, other).status == "created"
 
 
 class TestPage:

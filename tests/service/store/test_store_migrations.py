@@ -8,14 +8,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from alembic import command
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from running import rows
-from sqlalchemy import text
+from sqlalchemy import Connection, text
 
 import headimpact_service
 from headimpact_service.errors import Problem
-from headimpact_service.store import migrate
+from headimpact_service.store import impacts, migrate, organisations
 from headimpact_service.store.database import Database
 from headimpact_service.store.migrate import MigrationError
 from headimpact_service.store.tables import metadata
@@ -40,7 +42,7 @@ def test_the_version_is_committed(empty_url: str) -> None:
     database = Database(empty_url)
     database.migrate()
     database.close()
-    assert rows(empty_url, "SELECT version_num FROM alembic_version") == [("0004",)]
+    assert rows(empty_url, "SELECT version_num FROM alembic_version") == [("0005",)]
 
 
 def test_migrating_twice_changes_nothing(database: Database) -> None:
@@ -48,19 +50,47 @@ def test_migrating_twice_changes_nothing(database: Database) -> None:
     database.check()
 
 
-def test_the_way_back_to_an_empty_database_works(database: Database) -> None:
-    from alembic import command
-    from alembic.config import Config
-
+def _to(database: Database, revision: str) -> None:
+    """Downgrade to a revision."""
     config = Config()
     config.set_main_option("script_location", str(migrate.migrations_folder()))
     with database._writing.begin() as conn:
         config.attributes["connection"] = conn
-        command.downgrade(config, "base")
+        command.downgrade(config, revision)
+
+
+def test_the_way_back_to_an_empty_database_works(database: Database) -> None:
+    _to(database, "base")
     with pytest.raises(Problem, match="migrated"):
         database.check()
     database.migrate()
     database.check()
+
+
+def test_what_was_corrected_or_deleted_before_is_known_afterwards(database: Database, make_impact) -> None:
+    def fill(conn: Connection) -> bytes:
+        data_set = organisations.ensure_data_set(conn, organisations.ensure(conn, "o").id, "live")
+        first, second, _ = (impacts.add(conn, data_set, make_impact(word, external_id=None)).impact for word in "abc")
+        impacts.correct(conn, data_set, first.id, make_impact("d", external_id=None))
+        impacts.delete(conn, data_set, second.id)
+        return data_set
+
+    data_set = database.write(fill)
+    _to(database, "0004")
+    with database.read() as conn:
+        assert conn.execute(text("SELECT count(*) FROM impacts WHERE deleted_content IS NOT NULL")).scalar() == 1
+    database.migrate()
+    with database.read() as conn:
+        assert conn.execute(text("SELECT count(*) FROM impacts")).scalar() == 3
+        assert conn.execute(text("SELECT count(*) FROM former_contents")).scalar() == 2
+    again = database.write(
+        lambda conn: impacts.add(conn, data_set, make_impact("a", external_id=None), same_event_is_unchanged=True)
+    )
+    assert again.status == "unchanged"
+    with pytest.raises(Problem, match="deleted"):
+        database.write(
+            lambda conn: impacts.add(conn, data_set, make_impact("b", external_id=None), same_event_is_unchanged=True)
+        )
 
 
 def test_eight_processes_that_start_at_once_migrate_once(empty_url: str) -> None:
