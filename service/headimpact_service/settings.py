@@ -17,7 +17,7 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="HEADIMPACT_", frozen=True, extra="ignore")
 
     database_url: str = Field(default="sqlite:///headimpact.db", description="SQLAlchemy URL of the database.")
-    host: str = Field(default="127.0.0.1", description="Address to listen on.")
+    host: str = Field(default="127.0.0.1", min_length=1, description="Address to listen on.")
     port: int = Field(default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
     max_body: int = Field(default=8 * MEBIBYTE, ge=1, description="Largest JSON body, as sent and inflated [bytes].")
     max_upload: int = Field(default=512 * MEBIBYTE, ge=1, description="Largest upload, as sent and inflated [bytes].")

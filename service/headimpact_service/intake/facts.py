@@ -51,7 +51,7 @@ def _device_in(conn: Any, data_set_id: bytes, serial: str | None) -> DeviceFacts
 def _athlete_in(conn: Any, data_set_id: bytes, athlete_id: str | None, external_id: str | None) -> Athlete | None:  # noqa: ANN401 - a connection of the store
     raw = None if athlete_id is None else ids.decode("ath", athlete_id)
     if raw is not None:
-        return athletes.get(conn, data_set_id, raw)
+        return athletes.present(conn, data_set_id, raw)
     found = None if external_id is None else athletes.find(conn, data_set_id, external_id)
     return None if found is None else _as_merged(conn, data_set_id, found)
 

@@ -13,7 +13,7 @@ from headimpact_service.store import aliases, models
 
 DEFAULT = LAKSARI_2020
 """What is active as long as nobody has promoted another."""
-RESERVED = frozenset({"aliases", "fits", *PUBLISHED_MODELS})
+RESERVED = frozenset({"aliases", "fits", *aliases.ALIASES, *PUBLISHED_MODELS})
 """Names that no version of a data set may have."""
 _REMEMBERED = 256
 _known: dict[tuple[bytes, str], RiskModel] = {}

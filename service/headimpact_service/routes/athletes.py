@@ -11,14 +11,14 @@ from starlette.responses import Response
 
 from headimpact_service import deps
 from headimpact_service.answers import answer, no_content
-from headimpact_service.errors import not_found
+from headimpact_service.errors import Problem, not_found
 from headimpact_service.ingest.impact_json import Name, Strict, Word, Zone
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import SyncQuery
 from headimpact_service.routes.lists import MEDIA_TYPES, Listing, answer_list
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
 from headimpact_service.routes.tables import Cell
-from headimpact_service.store import athletes, ids
+from headimpact_service.store import athletes, diagnoses, ids
 from headimpact_service.store.athletes import Athlete, AthleteFields
 
 routes = Routes("athletes")
@@ -138,11 +138,13 @@ async def list_athletes(call: Call) -> Response:
     problems=("not-found",),
 )
 async def read_athlete(call: Call) -> Response:
-    """404 once erased."""
+    """404 once erased, or merged into another, whom the 404 names."""
     athlete_id = _id(call)
-    found = await deps.read(call.request, lambda conn: athletes.get(conn, call.data_set_id, athlete_id))
+    found = await deps.read(call.request, lambda conn: athletes.present(conn, call.data_set_id, athlete_id))
     if found is None:
         raise not_found("athlete")
+    if found.id != athlete_id:
+        raise Problem("not-found", f"This athlete was merged into {ids.encode('ath', found.id)}.")
     return answer(document(found), headers=etag(found.revision))
 
 
@@ -206,9 +208,13 @@ async def merge_athletes(call: Call) -> Response:
     """Impacts go over with their history and labels. Impacts sent later under the other's external id follow them."""
     athlete_id, revision = _id(call), if_match(call.request)
     into = deps.identifier("ath", call.body.into, "athlete")
-    merged = await deps.write(
-        call.request, lambda conn: athletes.merge(conn, call.data_set_id, athlete_id, into, if_match=revision)
-    )
+
+    def change(conn: Any) -> Athlete:  # noqa: ANN401 - a connection of the store
+        found = athletes.merge(conn, call.data_set_id, athlete_id, into, if_match=revision)
+        diagnoses.join(conn, call.data_set_id, into, call.key.id)
+        return found
+
+    merged = await deps.write(call.request, change)
     call.request.app.state.facts.forget()
     return answer(document(merged), headers=etag(merged.revision))
 

@@ -120,7 +120,10 @@ EXAMPLE = {
     problems=("not-found", "precondition-failed"),
 )
 async def put_label(call: Call) -> Response:
-    """What was said before stays in the history. The same again changes nothing."""
+    """What was said before stays in the history, which is answered to keys with `labels:read`; others see the label.
+
+    The same again changes nothing.
+    """
     impact_id, number = identifier(call), if_match(call.request)
     new = said(call.body)
 
@@ -128,7 +131,7 @@ async def put_label(call: Call) -> Response:
         labels.put(conn, call.data_set_id, impact_id, new, call.key.id, if_match=number)
         return labels.history(conn, call.data_set_id, impact_id)
 
-    return _answer(await deps.write(call.request, change))
+    return _answer(call, await deps.write(call.request, change))
 
 
 @routes(
@@ -145,7 +148,7 @@ async def read_label(call: Call) -> Response:
     found = await deps.read(call.request, lambda conn: labels.history(conn, call.data_set_id, impact_id))
     if not found:
         raise not_found("label")
-    return _answer(found)
+    return _answer(call, found)
 
 
 @routes(
@@ -232,8 +235,10 @@ def said(body: LabelBody) -> NewLabel:
     return NewLabel(**fields)
 
 
-def _answer(history: Sequence[Label]) -> Response:
+def _answer(call: Call, history: Sequence[Label]) -> Response:
     present = history[-1]
+    if "labels:read" not in call.key.scopes:
+        history = history[-1:]
     document = {"impact": ids.encode("imp", present.impact_id), **label_document(present)}
     return answer(document | {"history": [label_document(one) for one in history]}, headers=etag(present.number))
 

@@ -37,7 +37,7 @@ from headimpact_service.routes.model_shapes import (
 from headimpact_service.routes.preconditions import IF_MATCH, etag, if_match
 from headimpact_service.routes.short_lists import short_listing
 from headimpact_service.store import aliases, ids, models
-from headimpact_service.store.aliases import Alias, AliasName
+from headimpact_service.store.aliases import ALIASES, Alias, AliasName
 from headimpact_service.store.models import NewModel, StoredModel
 
 routes = Routes("models")
@@ -45,7 +45,6 @@ routes = Routes("models")
 VERSION = f"^{model_document.VERSION.pattern}$"
 Version = Annotated[str, Field(pattern=VERSION, max_length=model_document.MAX_VERSION, examples=["laksari-2020"])]
 DOCUMENT_BYTES = 16 * 1024 * 1024
-ALIASES: tuple[AliasName, ...] = ("active", "candidate")
 
 
 class ModelDocumentBody(BaseModel):

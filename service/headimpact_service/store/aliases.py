@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Literal, get_args
 
 from sqlalchemy import Connection, bindparam, insert, select, update
 
@@ -12,6 +12,7 @@ from headimpact_service.store.revision import require_revision
 from headimpact_service.store.tables import model_aliases
 
 AliasName = Literal["active", "candidate"]
+ALIASES: tuple[AliasName, ...] = get_args(AliasName)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

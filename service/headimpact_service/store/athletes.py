@@ -52,6 +52,9 @@ _NOTHING: dict[str, Any] = asdict(AthleteFields())
 _COLUMNS = [column for column in athletes.c if column.name != "data_set_id"]
 _ATHLETE = select(*_COLUMNS).where(athletes.c.data_set_id == bindparam("data_set_id"))
 _BY_ID = _ATHLETE.where(athletes.c.id == bindparam("athlete_id"), athletes.c.deleted_at.is_(None))
+_MERGED_INTO = select(athletes.c.merged_into).where(
+    athletes.c.data_set_id == bindparam("data_set_id"), athletes.c.id == bindparam("athlete_id")
+)
 _FORGET_MERGED = (
     update(athletes)
     .where(athletes.c.data_set_id == bindparam("of_data_set"), athletes.c.merged_into == bindparam("athlete"))
@@ -98,6 +101,12 @@ def get(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> Athlete | No
     """An athlete who was not erased."""
     row = conn.execute(_BY_ID, {"data_set_id": data_set_id, "athlete_id": athlete_id}).mappings().first()
     return None if row is None else _athlete(row)
+
+
+def present(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> Athlete | None:
+    """The athlete of an id; of one that was merged, who has the impacts now."""
+    into = conn.execute(_MERGED_INTO, {"data_set_id": data_set_id, "athlete_id": athlete_id}).scalar()
+    return get(conn, data_set_id, into or athlete_id)
 
 
 def find(conn: Connection, data_set_id: bytes, external_id: str) -> Athlete | None:

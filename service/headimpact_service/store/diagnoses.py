@@ -5,7 +5,9 @@ That is the rule of Laksari et al. 2020 for concussions that no single impact wa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Container, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
@@ -104,19 +106,20 @@ def add(
     known = _known(conn, data_set_id, athlete_id, new)
     session = {"data_set_id": data_set_id, "athlete_id": athlete_id, "session_id": new.session_id}
     rows = [_Candidate(*row) for row in conn.execute(_OF_SESSION, session)]
-    carrier = next((row for row in rows if known is not None and _carries(row, known)), None)
-    found = _attributable(rows, carrier)
-    if known is not None and carrier is not None:
-        if isinstance(found, Problem) or found.id == carrier.id:
-            return known, False
-        labels.withdraw(conn, data_set_id, carrier.id, key_id)
+    carriers = {row.id: one for row in rows for one in known if _carries(row, one)}
+    found = _attributable(rows, carriers)
+    kept = next(iter(carriers), None) if isinstance(found, Problem) else found.id
+    for carrier in carriers.keys() - {kept}:
+        labels.withdraw(conn, data_set_id, carrier, key_id)
+    if kept in carriers:
+        return carriers[kept], False
     if isinstance(found, Problem):
         raise found
-    if known is None:
-        made = _insert(conn, data_set_id, athlete_id, new, found.id, key_id)
+    if known:
+        conn.execute(_REATTRIBUTE, {"diagnosis": known[0].id, "impact_id": found.id})
+        made = replace(known[0], impact_id=found.id)
     else:
-        conn.execute(_REATTRIBUTE, {"diagnosis": known.id, "impact_id": found.id})
-        made = replace(known, impact_id=found.id)
+        made = _insert(conn, data_set_id, athlete_id, new, found.id, key_id)
     label = NewLabel(
         outcome="concussion",
         basis=new.basis,
@@ -129,24 +132,39 @@ def add(
     return made, True
 
 
-def _known(conn: Connection, data_set_id: bytes, athlete_id: bytes, new: NewDiagnosis) -> Diagnosis | None:
-    """The diagnosis that says the same of the same session."""
-    for known in of_athlete(conn, data_set_id, athlete_id):
-        if known.session_id == new.session_id and _said(known) == _said(new):
-            return known
-    return None
+def join(conn: Connection, data_set_id: bytes, athlete_id: bytes, key_id: bytes | None = None) -> None:
+    """Attribute to one impact what was reported of an athlete under two registrations: one concussion, not two."""
+    counted = Counter(
+        NewDiagnosis(
+            session_id=one.session_id, basis=one.basis, diagnosed_at=one.diagnosed_at, diagnosed_by=one.diagnosed_by
+        )
+        for one in of_athlete(conn, data_set_id, athlete_id)
+    )
+    for said, times in counted.items():
+        if times > 1:
+            with suppress(Problem):  # none of the session's impacts carries it
+                add(conn, data_set_id, athlete_id, said, key_id)
+
+
+def _known(conn: Connection, data_set_id: bytes, athlete_id: bytes, new: NewDiagnosis) -> list[Diagnosis]:
+    """The diagnoses that say the same of the same session: one, or those of athletes who turned out to be one."""
+    return [
+        known
+        for known in of_athlete(conn, data_set_id, athlete_id)
+        if known.session_id == new.session_id and _said(known) == _said(new)
+    ]
 
 
 def _carries(row: _Candidate, known: Diagnosis) -> bool:
     return row.diagnosis_id == known.id and row.outcome == "concussion"
 
 
-def _attributable(rows: Sequence[_Candidate], carrier: _Candidate | None) -> _Candidate | Problem:
+def _attributable(rows: Sequence[_Candidate], carriers: Container[bytes]) -> _Candidate | Problem:
     """The impact of a session that a diagnosis is attributed to, or why there is none.
 
-    `carrier` is the one that carries the diagnosis' label already.
+    `carriers` carry the diagnosis' label already: one, or more where athletes turned out to be one.
     """
-    injured = next((row for row in rows if row.outcome == "concussion" and row is not carrier), None)
+    injured = next((row for row in rows if row.outcome == "concussion" and row.id not in carriers), None)
     if injured is not None:
         name = ids.encode("imp", injured.id)
         return Problem("label-conflict", f"{name} of this session is labelled a concussion already.")

@@ -43,8 +43,15 @@ class Known(NamedTuple):
         return self.athlete_by_id or self.merged_into or self.athlete_by_name
 
 
+_SENT = athletes.alias("sent")
 _ATHLETE_BY_ID = (
-    athletes.c.id == bindparam("athlete_id"),
+    athletes.c.id
+    == func.coalesce(
+        select(_SENT.c.merged_into)
+        .where(_SENT.c.data_set_id == _DATA_SET, _SENT.c.id == bindparam("athlete_id"))
+        .scalar_subquery(),
+        bindparam("athlete_id", type_=athletes.c.id.type),
+    ),
     athletes.c.data_set_id == _DATA_SET,
     athletes.c.deleted_at.is_(None),
 )

@@ -168,6 +168,7 @@ class TestOthers:
             ("HEADIMPACT_DATABASE_URL", "sqlite:///:memory:"),
             ("HEADIMPACT_DATABASE_URL", "x"),
             ("HEADIMPACT_PORT", "no"),
+            ("HEADIMPACT_HOST", ""),
         ],
     )
     def test_a_setting_that_cannot_work_is_one_line_and_exit_code_2(

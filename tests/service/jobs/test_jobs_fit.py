@@ -293,7 +293,7 @@ class TestFit:
         assert answer.status_code == 422
         assert answer.json()["errors"][0].get("pointer", "") == pointer
 
-    @pytest.mark.parametrize("version", ["laksari-2020", "fits", "aliases"])
+    @pytest.mark.parametrize("version", ["laksari-2020", "fits", "aliases", "active", "candidate"])
     def test_a_name_that_is_taken_for_good_is_refused(self, api: Api, version: str) -> None:
         assert api.post("/v1/models/fits", json=QUICK | {"version": version}).status_code == 409
 

@@ -50,6 +50,23 @@ class TestAgain:
         assert api.get(f"/v1/athletes/{athlete}/diagnoses").json()["data"] == [again.json()]
         assert diagnose(api, athlete).status_code == 200
 
+    def test_two_registrations_of_one_athlete_have_one_concussion(self, api: Api) -> None:
+        mine, others = in_session(api, "e-1", 1.5), []
+        for number, scale in enumerate((1.0, 1.2)):
+            body = impact_body(f"o-{number}", scale, athlete={"external_id": "p-18"}, context={"session_id": "s-1"})
+            others.append(api.post("/v1/impacts", json=body).json()["id"])
+        athlete, other = athlete_of(api, mine), athlete_of(api, others[0])
+        diagnose(api, athlete)
+        diagnose(api, other)
+        assert (outcome(api, mine), outcome(api, others[1])) == ("concussion", "concussion")
+        assert api.post(f"/v1/athletes/{other}/merge", json={"into": athlete}).status_code == 200
+        assert (outcome(api, mine), outcome(api, others[1])) == ("concussion", None)
+        assert diagnose(api, athlete).json()["impact"] == mine
+        stronger = in_session(api, "e-9", 3.0)
+        again = diagnose(api, athlete)
+        assert (again.status_code, again.json()["impact"]) == (201, stronger)
+        assert [outcome(api, impact) for impact in (mine, *others, stronger)] == [None, None, None, "concussion"]
+
     def test_without_another_impact_it_is_the_conflict_of_a_session_without_any(self, api: Api) -> None:
         impact = in_session(api, "e-1", 1.0)
         athlete = athlete_of(api, impact)

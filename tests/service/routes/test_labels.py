@@ -345,6 +345,29 @@ class TestMoves:
         assert api.get(f"/v1/impacts/{two}/label").json()["outcome"] == "concussion"
         assert len(api.get(f"/v1/athletes/{target}/diagnoses").json()["data"]) == 1
 
+    def test_an_impact_of_a_merged_athletes_id_may_be_sent_again(self, api: Api) -> None:
+        one, two = in_session(api, "e-1", 1.0, "p-17"), in_session(api, "e-2", 2.0, "p-17b")
+        source, target = athlete_of(api, two), athlete_of(api, one)
+        body = impact_body("e-3", 3.0, athlete={"id": source})
+        first = api.post("/v1/impacts", json=body)
+        assert first.status_code == 201
+        api.post(f"/v1/athletes/{source}/merge", json={"into": target})
+        again = api.post("/v1/impacts", json=body)
+        assert (again.status_code, again.json()["id"]) == (200, first.json()["id"])
+        later = api.post("/v1/impacts", json=impact_body("e-4", 1.5, athlete={"id": source}))
+        assert (later.status_code, later.json()["athlete"]["id"]) == (201, target)
+        assert api.get(f"/v1/athletes/{source}").json()["detail"] == f"This athlete was merged into {target}."
+
+    def test_a_key_that_may_only_write_labels_does_not_read_what_others_said(
+        self, api: Api, make_key: Callable[..., str]
+    ) -> None:
+        impact = api.create("e-1")["id"]
+        put(api, impact, NONE)
+        writer = make_key("labels:write")
+        said = api.put(f"/v1/impacts/{impact}/label", json=NONE | {"labelled_by": "clinician-9"}, key=writer).json()
+        assert [one["labelled_by"] for one in said["history"]] == ["clinician-9"]
+        assert len(api.get(f"/v1/impacts/{impact}/label").json()["history"]) == 2
+
     def test_an_athlete_who_is_not_there_is_404_also_merged_into_itself(
         self, api: Api, make_key: Callable[..., str]
     ) -> None:
