@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import BindParameter, Connection, bindparam, delete, insert, select, update
 
-from headimpact_service.store import jobs
+from headimpact_service.store import duplicates, jobs
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.impact_rows import former_content
@@ -58,6 +58,7 @@ def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes],
         conn.execute(_FORGET, [{"impact": impact_id} for impact_id in impact_ids])
     else:
         remember(conn, data_set_id, impact_ids)
+    duplicates.release(conn, data_set_id, impact_ids)
     for statement in _CONTENTS:
         conn.execute(statement, [{"impact": impact_id} for impact_id in impact_ids])
     first = next_change(conn, impacts, data_set_id)

@@ -13,7 +13,7 @@ from sqlalchemy import BindParameter, Connection, and_, bindparam, select, updat
 from headimpact_service.errors import Problem, not_found
 from headimpact_service.store import athletes as athlete_store
 from headimpact_service.store import devices as device_store
-from headimpact_service.store import erasure, ids, labels
+from headimpact_service.store import duplicates, erasure, ids, labels
 from headimpact_service.store.clock import later_than, next_change
 from headimpact_service.store.impact_inserts import content_members, first_row, insert_revisions, insert_rows
 from headimpact_service.store.impact_known import Known, look_up
@@ -257,6 +257,8 @@ def correct(
     require_revision(present.revision, if_match)
     content = content_members(new, *_athlete_and_device(conn, data_set_id, new, known))
     changed = _name(data_set_id, present, new, known) | content
+    if new.input_digest != present.input_digest:
+        duplicates.release(conn, data_set_id, [impact_id])
     now = next_change(conn, impacts, data_set_id)
     changed |= {
         "duplicate_of": find_same_content(conn, data_set_id, new.input_digest, exclude=impact_id),

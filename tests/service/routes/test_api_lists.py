@@ -125,7 +125,7 @@ class TestSync:
         assert {row["revision"] for row in rows} == {1}
 
     def test_who_follows_the_pages_of_changes_sees_what_changes_meanwhile(self, api: Api) -> None:
-        made = [api.create(f"e-{i}") for i in range(3)]
+        made = [api.create(f"e-{i}", 1.0 + i) for i in range(3)]
         start = {"updated_since": made[0]["updated_at"], "limit": 2}
         page = api.get("/v1/impacts", params=start).json()
         api.delete(f"/v1/impacts/{made[0]['id']}")

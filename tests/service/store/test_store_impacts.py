@@ -300,6 +300,43 @@ class TestFormerContent:
         assert self.bring(database, data_set, other).status == "created"
 
 
+class TestDuplicates:
+    def three(self, database: Database, data_set: bytes, make_impact) -> list[Impact]:
+        return [add(database, data_set, make_impact(external_id=word)).impact for word in "abc"]
+
+    def test_those_of_one_that_is_corrected_are_of_the_next(self, database, data_set, make_impact) -> None:
+        first, second, third = self.three(database, data_set, make_impact)
+        assert [one.duplicate_of for one in (first, second, third)] == [None, first.id, first.id]
+        other = make_impact("other", external_id="a")
+        corrected = database.write(lambda conn: impacts.correct(conn, data_set, first.id, other)).impact
+        now = [get(database, data_set, one.id) for one in (second, third)]
+        assert [one.duplicate_of for one in now] == [None, second.id]
+        assert all(one.updated_at > before.updated_at for one, before in zip(now, (second, third), strict=True))
+        assert [one.revision for one in now] == [1, 1]
+        assert corrected.duplicate_of is None
+
+    def test_those_of_one_that_is_deleted_are_of_the_next(self, database, data_set, make_impact) -> None:
+        first, second, third = self.three(database, data_set, make_impact)
+        database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        assert [get(database, data_set, one.id).duplicate_of for one in (second, third)] == [None, second.id]
+        database.write(lambda conn: impacts.delete(conn, data_set, third.id))
+        assert get(database, data_set, second.id).duplicate_of is None
+
+    def test_another_context_leaves_them(self, database, data_set, make_impact) -> None:
+        first, second, _ = self.three(database, data_set, make_impact)
+        elsewhere = replace(make_impact(external_id="a"), session_id="s-9", content_digest=sha256(b"s-9").digest())
+        database.write(lambda conn: impacts.correct(conn, data_set, first.id, elsewhere))
+        assert get(database, data_set, second.id) == second
+
+    def test_those_of_an_erased_athlete_are_of_the_next(self, database, data_set, make_impact) -> None:
+        mine = add(database, data_set, make_impact(external_id="a", athlete_external_id="p-1")).impact
+        others = [
+            add(database, data_set, make_impact(external_id=word, athlete_external_id="p-2")).impact for word in "bc"
+        ]
+        database.write(lambda conn: athletes.erase(conn, data_set, mine.athlete_id))
+        assert [get(database, data_set, one.id).duplicate_of for one in others] == [None, others[0].id]
+
+
 class TestPage:
     START = datetime(2026, 1, 1, tzinfo=UTC)
 
