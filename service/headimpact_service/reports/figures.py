@@ -41,6 +41,8 @@ STYLE = {
 EVENT, OTHER, LINE, MUTED = "#b3261e", "#5f7c8a", "#0b5394", "#9aa5ad"
 SHOWN = 4
 """How many criteria a figure of curves shows beside the reference, the best first."""
+RISK_COLOURS = ("#5f7c8a", "#38761d", "#b45f06", "#b3261e", "#3b0a45")
+"""Of lines of equal risk, the lowest first: all of them dark enough to be read on white."""
 AXIS_COLOURS = ("#0b5394", "#b45f06", "#38761d")
 
 
@@ -121,15 +123,12 @@ def logistic_curve(one: CriterionRefit, found: Refit) -> str:
         grid = np.linspace(eta.min(), eta.max(), 300)
         ax.plot(grid, expit(grid), color=LINE, linewidth=1.8, label="in the sample")
         if found.options.tau is not None:
-            order = np.argsort(eta)
-            ax.plot(
-                eta[order],
-                expit(one.served[order]),
-                color=LINE,
-                linewidth=1.2,
-                linestyle=":",
-                label=f"as served, at an incidence of {found.options.tau:.3g}",
-            )
+            label = f"as served, at an incidence of {found.options.tau:.3g}"
+            line = np.polynomial.Polynomial.fit(eta, one.served, 1)  # exact where there is one component
+            if np.allclose(line(eta), one.served, rtol=0.0, atol=1e-6):
+                ax.plot(grid, expit(line(grid)), color=LINE, linewidth=1.2, linestyle=":", label=label)
+            else:
+                ax.plot(eta, expit(one.served), ".", color=LINE, markersize=2.5, label=label)
         generator = np.random.default_rng(0)
         ax.scatter(
             eta,
@@ -151,9 +150,9 @@ def logistic_curve(one: CriterionRefit, found: Refit) -> str:
         )
         label = "Linear predictor of the maximum-likelihood fit" if one.ml else "Linear predictor of Firth's fit"
         ax.set(xlabel=label, ylabel="Probability of concussion", ylim=(-0.05, 1.05))
-        ax.legend(loc="center left", fontsize=7.5)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), fontsize=7.5)
 
-    return _svg(draw, 1, (5.2, 3.4))
+    return _svg(draw, 1, (5.2, 4.0))
 
 
 def calibration_curve(one: CriterionRefit) -> str | None:
@@ -272,7 +271,8 @@ def risk_map_svg(drawn: RiskMap) -> str:
             if not present:
                 ax.text(0.5, 0.5, "no line of equal risk\nin this range", ha="center", transform=ax.transAxes)
                 continue
-            lines = ax.contour(x, y, p, levels=present, cmap="viridis_r", linewidths=1.4)
+            colours = [RISK_COLOURS[levels.index(level)] for level in present]
+            lines = ax.contour(x, y, p, levels=present, colors=colours, linewidths=1.4)
             ax.clabel(lines, fmt={level: f"{level:.2g}" for level in present}, fontsize=7)
         axes[0].set_ylabel("Amplitude about each axis [rad/s²]")
 
