@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -17,9 +18,19 @@ from headimpact_service.cli.score import with_mapping
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.upload import read_upload, sample_count
-from headimpact_service.intake.importing import COUNTED, look_up, make_ready, preview_row, score_found, store, summary
+from headimpact_service.intake.importing import (
+    COUNTED,
+    Item,
+    look_up,
+    make_ready,
+    preview_row,
+    score_found,
+    store,
+    summary,
+)
 from headimpact_service.intake.parts import parts
 from headimpact_service.intake.registry import active_model
+from headimpact_service.intake.rendering import new_score
 from headimpact_service.intake.scoring import Terms, terms_of
 from headimpact_service.store import organisation_settings, organisations
 from headimpact_service.store.database import Database
@@ -27,7 +38,8 @@ from headimpact_service.store.database import Database
 CHUNK = 500
 """Impacts that are committed together."""
 SHOWN = 5
-"""Refused impacts of a file that are told one by one."""
+"""Refused impacts of a file that are told one by one, and those that a dry run shows."""
+NOT_SCORED = "not scored"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +116,9 @@ def _import(
     try:
         total = sum(1 for _ in read_upload(content, options))
         rows: list[dict[str, Any]] = []
+        noted: Counter[str] = Counter()
         for part in parts(read_upload(content, options), sample_count, CHUNK):
-            rows += _chunk(database, target, part, len(rows), dry_run=dry_run)
+            rows += _chunk(database, target, part, len(rows), noted, dry_run=dry_run)
             advance(total, len(rows))
     except Problem as problem:
         console.print(f"{label}: refused: {problem_line(problem)}", markup=False)
@@ -113,30 +126,70 @@ def _import(
     except OSError as error:
         console.print(f"{label}: refused: {error.strerror or 'it cannot be read'}.", markup=False)
         return 1
-    return _report(console, label, rows)
+    return _report(console, label, rows, noted)
 
 
 def _chunk(
-    database: Database, target: Target, part: Sequence[Any], first: int, *, dry_run: bool
+    database: Database, target: Target, part: Sequence[Any], first: int, noted: Counter[str], *, dry_run: bool
 ) -> list[dict[str, Any]]:
     with database.read() as conn:
         known = look_up(conn, target.data_set_id, part)
     items = score_found(part, known, target.terms)
+    for item in items:
+        noted.update(_notes(item))
     if dry_run:
         return [preview_row(index, item) for index, item in enumerate(items, first)]
     ready = make_ready(items, None)
     return database.write(lambda conn: store(conn, target.data_set_id, ready, first))
 
 
-def _report(console: Console, label: Path, rows: Sequence[Mapping[str, Any]]) -> int:
+def _notes(item: Item) -> set[str]:
+    """What is noted of an impact, by its codes, and whether it has no score."""
+    if isinstance(item.outcome, Problem):
+        return set()
+    stored = new_score(item.outcome)
+    return {*stored.quality_codes, *([NOT_SCORED] if stored.state == "unscorable" else [])}
+
+
+def _report(console: Console, label: Path, rows: Sequence[Mapping[str, Any]], noted: Mapping[str, int]) -> int:
     counts = summary(dict(row) for row in rows)
     readable = sum(row["status"] == "readable" for row in rows)
     told = [f"{counts[name]} {name}" for name in COUNTED if counts[name] or (name == "created" and not readable)]
     console.print(f"{label}: {', '.join([f'{readable} readable', *told] if readable else told)}", markup=False)
+    if noted:
+        console.print(f"    noted: {', '.join(f'{code} ({noted[code]})' for code in sorted(noted))}", markup=False)
+    for row in [row for row in rows if "preview" in row][:SHOWN]:
+        for line in _preview_lines(row):
+            console.print(f"    {line}", markup=False)
     failed = [row for row in rows if row["status"] == "failed"]
     for row in failed[:SHOWN]:
         name = row["external_id"] or f"impact {row['index']}"
-        console.print(f"    {name}: {row['problem']['detail']}", markup=False)
+        console.print(f"    {name}: {_problem_line(row['problem'])}", markup=False)
     if len(failed) > SHOWN:
         console.print(f"    and {len(failed) - SHOWN} more")
     return len(failed)
+
+
+def _preview_lines(row: Mapping[str, Any]) -> Iterator[str]:
+    """What was read of an impact: its signals in their own units, and what is noted."""
+    preview = row["preview"]
+    name = row["external_id"] or f"impact {row['index']}"
+    whose = ", ".join(f"{what} {preview[what]}" for what in ("athlete", "device", "occurred_at") if preview[what])
+    yield f"{name}: axes {preview['kinematics']['axes']}{', ' if whose else ''}{whose}"
+    for signal, sent in preview["as_sent"].items():
+        peaks = ", ".join(f"{axis} {'-' if peak is None else f'{peak:.4g}'}" for axis, peak in sent["peak"].items())
+        yield (
+            f"  {signal.replace('_', ' ')} [{sent['unit']}]: {sent['samples']} samples, "
+            f"{sent['sample_rate_hz']:.6g} Hz, peaks {peaks}"
+        )
+    for note in preview["quality"]:
+        yield f"  {note['severity']} {note['code']}: {note['detail']}"
+
+
+def _problem_line(problem: Mapping[str, Any]) -> str:
+    """As :func:`headimpact_service.cli.faults.problem_line`, of a problem as it is answered."""
+    news = [error for error in problem.get("errors", ()) if error["detail"] not in problem["detail"]]
+    places = "; ".join(
+        f"{error.get('pointer') or error.get('parameter') or 'body'}: {error['detail']}" for error in news
+    )
+    return f"{problem['detail']} {places}".strip()

@@ -15,6 +15,9 @@ from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.stamps import may_be_stated
 from headimpact_service.ingest.table import FloatArray
 
+BETWEEN = 0.1
+"""Of a step: how far the samples of two axes of one signal may be apart, as times in headers are rounded."""
+
 
 @dataclass(frozen=True, slots=True)
 class Curve:
@@ -66,7 +69,15 @@ def _common(curves: Sequence[Curve]) -> list[Curve]:
     if rate is None:
         return _on_the_same_stamps(curves)
     start = max(float(curve.stamps_s[0]) for curve in curves)
-    offsets = [round((start - float(curve.stamps_s[0])) * rate) for curve in curves]
+    later = [(start - float(curve.stamps_s[0])) * rate for curve in curves]
+    offsets = [round(samples) for samples in later]
+    for curve, samples, offset in zip(curves, later, offsets, strict=True):
+        if abs(samples - offset) > BETWEEN:
+            raise file_fault(
+                f"The samples of {curve.axis} lie {abs(samples - offset):.2g} of a step between those of another axis "
+                "of the same signal: bring them to common times.",
+                "rates-differ",
+            )
     count = min(curve.values.size - offset for curve, offset in zip(curves, offsets, strict=True))
     if count < 3:
         raise file_fault("The head's curves must overlap in time by at least 3 samples.", "no-overlap")

@@ -35,6 +35,8 @@ class _Words:
 
     resultants: frozenset[str]
     peaks: frozenset[str]
+    alone: frozenset[str]
+    """What says that it is a resultant and not of which quantity, which its unit has to say."""
     units: tuple[tuple[str, str | None], ...]
 
 
@@ -76,11 +78,11 @@ def peak_said(texts: Collection[str]) -> float | None:
 
 def _understood(signal: SignalName, heading: str) -> tuple[Kind, str | None] | None:
     """What a heading holds of a signal, and in which unit; what names no quantity has to name its unit, as a peak."""
-    words, alone = _words(signal), vocabulary()["supplied"]["alone"]
+    words = _words(signal)
     for spelling, unit in words.units:
         form = heading.removesuffix(spelling)
         if heading.endswith(spelling):
-            if form in words.resultants or (unit is not None and form in alone):
+            if form in words.resultants or (unit is not None and form in words.alone):
                 return "resultant", unit
             if unit is not None and form in words.peaks:
                 return "peak", unit
@@ -89,7 +91,8 @@ def _understood(signal: SignalName, heading: str) -> tuple[Kind, str | None] | N
 
 @cache
 def _words(signal: SignalName) -> _Words:
-    said, of_signal = vocabulary()["supplied"], vocabulary()[signal]
+    said = {kind: [compact(word) for word in words] for kind, words in vocabulary()["supplied"].items()}
+    of_signal = vocabulary()[signal]
     quantities = [compact(word) for word in of_signal["words"]]
     resultants = {form for name, word in product(quantities, said["resultant"]) for form in _joined(name, word)}
     clear = (*resultants, *said["alone"], *of_signal["peaks"])
@@ -98,7 +101,7 @@ def _words(signal: SignalName) -> _Words:
     spelled = [(compact(s), unit) for unit, spellings in of_signal["units"].items() for s in spellings]
     longest_first = sorted(spelled, key=lambda one: len(one[0]), reverse=True)
     peaks = {*named, *largest, *said["peak"], *of_signal["peaks"]}
-    return _Words(frozenset(resultants), frozenset(peaks), (*longest_first, ("", None)))
+    return _Words(frozenset(resultants), frozenset(peaks), frozenset(said["alone"]), (*longest_first, ("", None)))
 
 
 def _joined(name: str, word: str) -> list[str]:

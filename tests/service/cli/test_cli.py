@@ -231,8 +231,27 @@ class TestImport:
         file = tmp_path / "a.json"
         file.write_text(json.dumps(impact_body("a")))
         database = f"sqlite:///{tmp_path / 'x.db'}"
-        assert run("import", str(file), "--dry-run", "--database-url", database)[1].strip() == f"{file}: 1 readable"
+        first, *shown = run("import", str(file), "--dry-run", "--database-url", database)[1].splitlines()
+        assert first == f"{file}: 1 readable"
+        assert (
+            shown[0]
+            == "    a: axes anatomical, athlete p-17, occurred_at 2026-11-20 19:04:05.123000+00:00"
+        )
+        assert "      linear acceleration [g]: 100 samples, 1000 Hz, peaks x 30" in shown[1]
         assert "1 created" in run("import", str(file), "--database-url", database)[1]
+
+    def test_what_is_noted_and_which_rules_are_broken_is_said(self, run: Run, tmp_path: Path) -> None:
+        marked = impact_body("a", unscorable=["A channel was lost."])
+        broken = impact_body("b")
+        del broken["kinematics"]["linear_acceleration"]["sample_rate_hz"]
+        file = tmp_path / "a.ndjson"
+        file.write_text("\n".join(map(json.dumps, (marked, broken))))
+        _, printed, _ = run("import", str(file), "--database-url", f"sqlite:///{tmp_path / 'x.db'}")
+        first, noted, failed = printed.splitlines()
+        assert first == f"{file}: 1 created, 1 failed"
+        assert noted == "    noted: not scored (1)"
+        assert "/kinematics/linear_acceleration" in failed
+        assert "sample_rate_hz" in failed
 
     def test_a_path_that_is_not_there_has_its_line_and_stops_nothing(self, run: Run, tmp_path: Path) -> None:
         file, missing = tmp_path / "a.json", tmp_path / "none.csv"

@@ -435,6 +435,18 @@ class TestTogether:
         assert prepare(record.recording).kinematics.time_ms(0) == pytest.approx(-5.0, abs=1e-9)
         assert [n.channel for n in record.notes if n.code == "sample_count_mismatch"] == ["x", "y", "z"]
 
+    @pytest.mark.parametrize(("apart", "read"), [(0.05, True), (0.5, False), (1.5, False), (1.0, True)])
+    def test_axes_between_whose_samples_another_lies_are_refused(self, apart: float, read: bool):
+        held = channels()
+        later = FIRST_S + apart * INTERVAL_S
+        held[AX] = channel(AX, "g", half_sine(SAMPLES, 30.0).tolist(), time_of_first_sample=f"{later:.6f}")
+        if read:
+            assert one(iso_mme(held)).recording.linear_acceleration is not None
+        else:
+            problem = refused(iso_mme(held))
+            assert [error.code for error in problem.errors] == ["rates-differ"]
+            assert "0.5 of a step between those of another axis" in problem.detail
+
     def test_a_channel_that_ends_early_cuts_no_other_signal_and_what_it_hides_is_said(self):
         ay = next(code for code in ISO_CODES if "ACY" in code)
         short = half_sine(SAMPLES, -12.0)[:12].tolist()

@@ -226,3 +226,11 @@ def test_a_struct_states_its_peaks() -> None:
     ]
     found = read(mat({"impact": structs(*impacts)}), preset="stanford_mat")
     assert [mismatches(record) for record in found] == [[], ["linear_acceleration"], []]
+
+
+@pytest.mark.parametrize("heading", ["Betrag (g)", "Vector sum (g)", "Résultante (g)", "acc Betrag (g)", "SVM (g)"])
+def test_resultants_in_other_words_are_held_against_the_samples(heading: str):
+    first, *lines = csv_text().splitlines()
+    twice = [2.0 * float(np.linalg.norm(row[:3])) for row in six_axis()]
+    text = "\n".join([f"{first},{heading}", *(f"{line},{value}" for line, value in zip(lines, twice, strict=True))])
+    assert "vendor_peak_mismatch" in [note.code for note in one(text).notes]
