@@ -87,6 +87,11 @@ def near_full_scale(declared_range: float) -> float:
     return float(fraction * declared_range * (1.0 - QUALITY_LIMITS["conversion"]["rounding"]))
 
 
+def beyond_full_scale(declared_range: float) -> float:
+    """The least magnitude that a sensor of this range cannot show."""
+    return float(QUALITY_LIMITS["saturation"]["beyond_range"] * declared_range)
+
+
 def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: bool) -> Iterator[QualityNote]:
     """Notes on single channels as sent.
 
@@ -102,6 +107,7 @@ def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: 
     magnitude = np.abs(samples)
     peaks: FloatArray = magnitude.max(axis=0)
     yield from _extreme_values(channels, peaks)
+    yield from _beyond_range(channels, peaks)
     if not planar:
         yield from _constant_channels(channels, samples)
     yield from _saturated(channels, magnitude, peaks)
@@ -117,6 +123,17 @@ def _extreme_values(channels: Sequence[Channel], peaks: FloatArray) -> Iterator[
                 channel,
                 f"The {words(channel.signal)} reaches {peak:.4g} {unit} on {channel.axis}; few heads go beyond "
                 f"{bound:g}.",
+            )
+
+
+def _beyond_range(channels: Sequence[Channel], peaks: FloatArray) -> Iterator[QualityNote]:
+    for channel, peak in zip(channels, peaks.tolist(), strict=True):
+        if peak > beyond_full_scale(channel.declared_range):
+            yield _warning(
+                "implausible_units",
+                channel,
+                f"The {words(channel.signal)} reaches {peak:.4g} {UNITS_OF[channel.signal][0]} on {channel.axis}, and "
+                f"its sensor shows {channel.declared_range:.4g} at most: the unit or the range is not what it says.",
             )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from headimpact.published import QUALITY_LIMITS
-from headimpact.quality import Channel, highest_of, near_full_scale
+from headimpact.quality import Channel, beyond_full_scale, highest_of, near_full_scale
 from headimpact.recording import FloatArray
 
 BoolArray = NDArray[np.bool_]
@@ -26,7 +26,7 @@ class Screen:
     Parameters
     ----------
     extreme
-        Magnitudes that earn a note or are refused.
+        Magnitudes that earn a note or are refused, or that the sensor cannot show.
     near_full_scale
         Magnitudes near a sensor's declared range, infinite where none is declared.
     linear, rotational
@@ -43,7 +43,12 @@ class Screen:
         """The screen of these channels."""
         linear = sum(channel.signal == "linear_acceleration" for channel in channels)  # they come first
         return cls(
-            np.array([[highest_of(channel.signal, "extreme")] for channel in channels]),
+            np.array(
+                [
+                    [min(highest_of(channel.signal, "extreme"), beyond_full_scale(channel.declared_range))]
+                    for channel in channels
+                ]
+            ),
             np.array([[near_full_scale(channel.declared_range)] for channel in channels]),
             slice(linear),
             slice(linear, len(channels)),

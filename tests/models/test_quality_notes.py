@@ -311,3 +311,10 @@ def test_notes_of_preparation_and_of_scoring_come_together():
     prepared = prepare(linear(A[:50]))
     assert isinstance(prepared, Preparation)
     assert [note.code for note in score(prepared).quality][-1] == "record_truncated"
+
+
+@pytest.mark.parametrize(("level", "noted"), [(126.0, True), (-126.0, True), (124.0, False)])
+def test_a_sample_far_beyond_the_declared_range_is_named(level: float, noted: bool):
+    found = notes(linear(at(A, 40, 1, level), declared_range=100.0), "implausible_units")
+    assert [(note.signal, note.channel) for note in found] == [("linear_acceleration", "y")] * noted
+    assert all("its sensor shows 100 at most" in note.detail for note in found)

@@ -233,10 +233,7 @@ class TestImport:
         database = f"sqlite:///{tmp_path / 'x.db'}"
         first, *shown = run("import", str(file), "--dry-run", "--database-url", database)[1].splitlines()
         assert first == f"{file}: 1 readable"
-        assert (
-            shown[0]
-            == "    a: axes anatomical, athlete p-17, occurred_at 2026-11-20 19:04:05.123000+00:00"
-        )
+        assert shown[0] == "    a: axes anatomical, athlete p-17, occurred_at 2026-11-20 19:04:05.123000+00:00"
         assert shown[1].startswith("      linear acceleration [g]: 100 samples, 1000 Hz, peaks x ")
         assert "1 created" in run("import", str(file), "--database-url", database)[1]
 
