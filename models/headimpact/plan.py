@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
@@ -88,6 +89,7 @@ def plan_of(layout: Layout) -> Plan:
     notes: list[QualityNote] = []
     for signal in layout.signals:
         notes += check_rate(signal.name, signal.track.rate_hz)
+    notes += _trigger_notes(layout)
     signals, filters = _filters(layout, notes)
     tracks, velocity_source, acceleration_source = _held_tracks(layout, notes)
     comparison = None
@@ -112,6 +114,22 @@ def plan_of(layout: Layout) -> Plan:
         offset_m=_offset(layout, tracks),
         start_time_ms=(base.start_s - layout.clock_start_s) * 1000.0 - (layout.pre_trigger_ms or 0.0),
     )
+
+
+def _trigger_notes(layout: Layout) -> Iterator[QualityNote]:
+    """Stamps that go through zero at another time than the trigger is said to be."""
+    stamped = [signal.track for signal in layout.signals if signal.track.stated]
+    said = layout.pre_trigger_ms
+    if said is None or not stamped or layout.clock_start_s >= 0.0:
+        return
+    ends = max(track.start_s + (track.samples - 1) / track.rate_hz for track in stamped)
+    before, step = -1000.0 * layout.clock_start_s, 1000.0 / min(track.rate_hz for track in stamped)
+    if ends >= 0.0 and abs(said - before) > step:
+        detail = (
+            f"The time stamps begin {before:g} ms before zero, and the trigger is said to be {said:g} ms after the "
+            "first sample, which was taken."
+        )
+        yield QualityNote("time_origin_mismatch", "note", detail)
 
 
 def _groups(layout: Layout) -> tuple[Group, ...]:

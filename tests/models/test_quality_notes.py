@@ -318,3 +318,14 @@ def test_a_sample_far_beyond_the_declared_range_is_named(level: float, noted: bo
     found = notes(linear(at(A, 40, 1, level), declared_range=100.0), "implausible_units")
     assert [(note.signal, note.channel) for note in found] == [("linear_acceleration", "y")] * noted
     assert all("its sensor shows 100 at most" in note.detail for note in found)
+
+
+@pytest.mark.parametrize(("pre_trigger_ms", "noted"), [(30.0, True), (10.4, False), (None, False)])
+def test_stamps_that_go_through_zero_at_another_time_than_the_trigger_are_noted(
+    pre_trigger_ms: float | None, noted: bool
+):
+    stamps = (np.arange(100) - 10.0) / 1000.0
+    given = Recording(Signal(A, "g", time_s=stamps), low_pass=NO_FILTER, pre_trigger_ms=pre_trigger_ms)
+    found = notes(given, "time_origin_mismatch")
+    assert [note.severity for note in found] == ["note"] * noted
+    assert all("begin 10 ms before zero" in note.detail for note in found)

@@ -229,6 +229,18 @@ class ImpactTimes:
             return 0.0
         return stated if before is None else before
 
+    def other_trigger(self, tracks: list[Track], said_ms: float | None) -> Iterator[QualityNote]:
+        """A note on times that go through zero at another time than the trigger is said to be."""
+        spans = [span for track in tracks if (span := track.from_zero_ms) is not None]
+        before_ms = before_zero_ms(spans) if spans and self.mapping.zero != "record_start" else None
+        steps = [1000.0 / rate for track in tracks if (rate := track.samples_per_s)]
+        if said_ms is not None and before_ms is not None and abs(said_ms - before_ms) > max(steps, default=0.0):
+            detail = (
+                f"The times begin {before_ms:g} ms before zero, and the trigger is said to be {said_ms:g} ms after "
+                "the first sample, which was taken."
+            )
+            yield QualityNote("time_origin_mismatch", "note", detail)
+
     def _require_longer(self, tracks: list[Track], before_ms: float | None) -> None:
         """Refuse a record that is over before its trigger: it is not of this layout."""
         lengths = [1000.0 * len(numbers_of(track.rows)) / track.rate for track in tracks if track.rate is not None]

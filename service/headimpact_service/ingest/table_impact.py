@@ -127,16 +127,20 @@ class TableImpact:
             self.times.require_times(whole)
             if scorable and not fill_gaps:
                 self.samples.require_finite(self.layout.signals[track.name].columns, track.rows, self.row)
+        bases = time_bases(kept)
         signals: dict[str, Any] = {
-            track.name: self._signal(track, base) for track, base in zip(kept, time_bases(kept), strict=True)
+            track.name: self._signal(track, base) for track, base in zip(kept, bases, strict=True)
         }
+        pre_trigger_ms = self.times.pre_trigger_ms(tracks, kept, reading)
+        if all(stamps is None for _, stamps in bases):  # else they are held against it as any stamps are
+            self.notes += self.times.other_trigger(kept, pre_trigger_ms)
         chosen = reading.filter or mapping.filter
         return Recording(
             axes=options.axes or reading.axes or mapping.axes or "anatomical",
             mounting=self._mounting(),
             constrained_plane=reading.constrained_plane or mapping.constrained_plane,
             low_pass=options.low_pass or (PAPER if chosen is None else low_pass(chosen)),
-            pre_trigger_ms=self.times.pre_trigger_ms(tracks, kept, reading),
+            pre_trigger_ms=pre_trigger_ms,
             fill_gaps=fill_gaps,
             **signals,
         )

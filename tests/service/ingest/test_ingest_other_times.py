@@ -374,3 +374,11 @@ def test_a_rate_does_not_make_up_for_a_lost_sample(lost: int, rate_hz: int, digi
     column = [f"{line},{rate_hz}" for line in without.split("\n")[1:]]
     in_rows = "\n".join([f"{heading},sample_rate_hz", *column])
     assert codes(refused(in_rows)) == [("sample_rate_hz", "rate-differs")]
+
+
+@pytest.mark.parametrize(("said", "noted"), [(30, True), (10, False)])
+def test_times_that_go_through_zero_at_another_time_than_the_trigger_are_noted(said: int, noted: bool):
+    rows = [[sample - 10, *row] for sample, row in enumerate(six_axis(100).tolist())]
+    record = one(table(["t_ms", *SIX], rows), mapping=Mapping.model_validate({"pre_trigger_ms": said}))
+    assert record.recording.pre_trigger_ms == said
+    assert [note.code for note in record.notes] == ["time_origin_mismatch"] * noted
