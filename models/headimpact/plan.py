@@ -118,7 +118,7 @@ def plan_of(layout: Layout) -> Plan:
 
 def _trigger_notes(layout: Layout) -> Iterator[QualityNote]:
     """Stamps that go through zero at another time than the trigger is said to be."""
-    stamped = [signal.track for signal in layout.signals if signal.track.stated]
+    stamped = [signal.track for signal in layout.signals if not signal.track.stated]
     said = layout.pre_trigger_ms
     if said is None or not stamped or layout.clock_start_s >= 0.0:
         return
