@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.apart import Apart
 from headimpact_service.ingest.guard import GuardedLines, GuardedTable, guarded
 from headimpact_service.ingest.json_format import refuse_table_options
 from headimpact_service.ingest.mapping import Mapping, merge
@@ -78,6 +79,7 @@ class _Reading:
         self._count = 0
         self._unknown: Problem | None = None
         self._refused: Problem | None = None
+        self._apart = Apart("sheets")
 
     def lines(self, lines: GuardedLines) -> Impacts:
         """Rows in the shape of our JSON."""
@@ -95,6 +97,8 @@ class _Reading:
             for item in read_table(table, _as_preset_means(table, options), format_name=self._kind):
                 self._count += 1
                 labels = {} if table.name is None else {"sheet": table.name}
+                if table.name is not None:
+                    self._apart.add(table.name, [item])
                 yield item if isinstance(item, Problem) else _labelled(item, **labels)
         except Problem as problem:
             if is_no_signal(problem):
@@ -106,9 +110,10 @@ class _Reading:
                 yield Problem(problem.slug, f"Sheet {table.name}: {problem.detail}", errors=problem.errors)
 
     def require_impacts(self) -> None:
-        """Refuse a file of which no table was read."""
+        """Refuse a file of which no table was read, and one whose sheets hold a sensor each."""
         if self._count == 0:
             raise self._refused or self._unknown or Problem("unreadable-file", "The file holds no impact.")
+        self._apart.require_none()
 
 
 def _as_preset_means(table: GuardedTable, options: ImportOptions) -> ImportOptions:

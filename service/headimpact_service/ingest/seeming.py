@@ -70,6 +70,20 @@ def left_signals(layout: Layout, headings: Headings, table: Table) -> dict[Signa
     return {signal: columns for signal, columns in found.items() if signal not in layout.signals}
 
 
+def given_twice(layout: Layout, headings: Headings, table: Table) -> list[QualityNote]:
+    """The notes on columns that seem to be a signal that is read from others."""
+    found = _seeming(headings, table, set(layout.numbers))
+    return [_twice(signal, columns) for signal, columns in found.items() if signal in layout.signals]
+
+
+def _twice(signal: SignalName, columns: Sequence[str]) -> QualityNote:
+    detail = (
+        f"The columns {', '.join(columns[:MAX_SHOWN])} seem to be the {words(signal)} too, which was read from others. "
+        "If they are the ones that count, name them in a mapping."
+    )
+    return QualityNote("channel_given_twice", "note", detail, signal)
+
+
 def not_read(signal: SignalName, columns: Sequence[str]) -> Problem:
     """The 422 for columns that seem to be a signal, of which nobody has said how to read them."""
     return layout_problem(

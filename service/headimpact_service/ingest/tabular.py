@@ -32,7 +32,7 @@ from headimpact_service.ingest.presets import (
 )
 from headimpact_service.ingest.record import ImpactRecord, RefusedImpact
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.seeming import left_signals, not_named, not_read, unnamed
+from headimpact_service.ingest.seeming import given_twice, left_signals, not_named, not_read, unnamed
 from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.table_impact import TableImpact
 from headimpact_service.ingest.time_headings import speaks_of_times
@@ -181,7 +181,8 @@ def _require_read(layout: Layout, headings: Headings, options: ImportOptions, ta
     if options.mapping is None or not _names_signals(options.mapping):
         for signal, columns in left.items():
             raise not_read(signal, columns)
-        return replace(layout, notes=tuple(unnamed(layout, headings, table)))
+        beside = (*unnamed(layout, headings, table), *given_twice(layout, headings, table))
+        return replace(layout, notes=beside)
     # an angular acceleration beside a velocity that is read would only be its derivative
     derived = {"angular_acceleration"} if "angular_velocity" in layout.signals else set[str]()
     said = {*derived, *(name for name in SIGNALS if _is_null(options.mapping, name))}

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 
 from headimpact_service.errors import Problem
+from headimpact_service.ingest.apart import Apart
 from headimpact_service.ingest.csv_format import read_csv
 from headimpact_service.ingest.detect import HEAD
 from headimpact_service.ingest.dts import PRESET as DTS
@@ -42,11 +43,13 @@ def _is_table(name: str) -> bool:
 
 def read_folder(archive: GuardedZip, options: ImportOptions) -> Impacts:
     """Each table of a folder as the file that it is; one that cannot be read as a whole is refused alone."""
-    left = options.max_impacts
+    left, apart = options.max_impacts, Apart("files")
     for name in sorted(archive.names):
         found = _read_member(archive, name, replace(options, filename=name[-MAX_PATH:], max_impacts=left))
         left -= len(found)
+        apart.add(name, found)
         yield from found
+    apart.require_none()
 
 
 def _read_member(archive: GuardedZip, name: str, options: ImportOptions) -> list[ImpactRecord | Problem]:

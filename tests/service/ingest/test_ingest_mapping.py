@@ -422,6 +422,13 @@ def test_columns_that_seem_to_be_a_signal_are_never_passed_over(columns):
     assert record.recording.angular_velocity is None
 
 
+@pytest.mark.parametrize("again", ["ax_cg (g),ay_cg (g),az_cg (g)", "ax_filt (g),ay_filt (g),az_filt (g)"])
+def test_a_second_set_of_a_signal_is_noted(again: str):
+    [note] = one(table(f"t_ms,ax (g),ay (g),az (g),wx_rad_s,wy_rad_s,wz_rad_s,{again}")).notes
+    assert (note.code, note.severity, note.signal) == ("channel_given_twice", "note", "linear_acceleration")
+    assert again.replace(",", ", ") in note.detail
+
+
 def test_three_axes_of_a_quantity_that_nobody_tells_are_noted_where_a_signal_is_missing():
     gyroscope, head = "t_ms,wx_rad_s,wy_rad_s,wz_rad_s", "HEAD CG X,HEAD CG Y,HEAD CG Z"
     [note] = one(table(f"{gyroscope},{head}")).notes

@@ -213,3 +213,29 @@ def test_commas_that_may_group_thousands_in_numbers_kept_as_text_are_refused():
     for row in rows:
         row[1] = "1,250"
     assert "is not clear" in refused(xlsx({"a": [headings, *rows]})).detail
+
+
+def sheets_of_sensors(**names: str) -> dict[str, list[Row]]:
+    headings, *rows = generic()
+    parts = {"linear": slice(1, 4), "rotation": slice(4, 7)}
+    return {
+        names[part]: [[headings[0], *headings[columns]], *([row[0], *row[columns]] for row in rows)]
+        for part, columns in parts.items()
+    }
+
+
+def test_sheets_that_hold_a_sensor_each_are_not_two_impacts():
+    problem = refused(xlsx(sheets_of_sensors(linear="Accelerometer", rotation="Gyroscope")))
+    assert problem.slug == "unreadable-file"
+    assert problem.detail.startswith("The sheets Accelerometer and Gyroscope hold a sensor each")
+    assert len(records(xlsx(sheets_of_sensors(linear="Event 1", rotation="Event 2")))) == 2
+    assert len(records(xlsx({"Accelerometer": generic(), "Gyroscope": generic()}))) == 2
+
+
+def test_files_of_a_folder_that_hold_a_sensor_each_are_not_two_impacts():
+    texts = {
+        f"{name}.csv": "\n".join(",".join(map(str, row)) for row in rows)
+        for name, rows in sheets_of_sensors(linear="hit1_acc", rotation="hit1_gyro").items()
+    }
+    with pytest.raises(Problem, match=r"The files hit1_acc\.csv and hit1_gyro\.csv hold a sensor each"):
+        read(zipped(texts))
