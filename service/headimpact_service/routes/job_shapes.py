@@ -55,6 +55,7 @@ class FitResult(BaseModel):
     version: str | None = Field(description="Of the model; null where there is none.")
     skipped: str | None = Field(description="Why a schedule had nothing to do.")
     promoted: bool = Field(description="Whether it is active now, having passed every gate.")
+    not_promoted: str | None = Field(description="Why it is not, although it passed every gate.")
     gates: list[GateView] | None = Field(description="Of a schedule's fit.")
 
 

@@ -9,6 +9,9 @@ from pathlib import Path
 LOW = 64 * 1024 * 1024
 """Free bytes below which an operator is warned."""
 
+PRIVATE = 0o600
+"""Files of people's measurements are for this user only."""
+
 
 def warnings(folder: Path, what: str) -> list[str]:
     """What an operator should know of a folder that is written to, as sentences; it is made if it is not there."""

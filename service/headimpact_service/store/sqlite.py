@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ from sqlalchemy import Connection, Engine, event
 from sqlalchemy.engine import URL
 from sqlalchemy.exc import OperationalError
 
+from headimpact_service.store import disk
 from headimpact_service.store.access import Access, DatabaseUrlError
 
 WAL_RESET_FIXED = (3, 51, 3)
@@ -28,9 +31,12 @@ def checked(url: URL) -> URL:
 
 
 def prepare(url: URL) -> None:
-    """Create the folder of the file."""
+    """Create the folder of the file, and the file for this user only: its log and its index are made like it."""
     if url.database is not None and not url.database.startswith("file:"):
-        Path(url.database).parent.mkdir(parents=True, exist_ok=True)
+        file = Path(url.database)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(OSError):  # said where it is opened
+            os.close(os.open(file, os.O_RDWR | os.O_CREAT, disk.PRIVATE))
 
 
 def options(access: Access, busy_timeout_s: float) -> dict[str, Any]:

@@ -20,8 +20,6 @@ from headimpact_service.store.unavailable import unavailable
 
 PARTIAL = ".part"
 BLOCK = 1024 * 1024
-PRIVATE = 0o600
-"""Files of people's measurements are for this user only."""
 
 
 def job_folder(url: URL) -> Path:
@@ -144,7 +142,7 @@ class Incoming:
         self._path = self._folder / f"{uuid4().hex}{PARTIAL}"
         before = self.contents()
         self._file.close()
-        self._file = os.fdopen(os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_EXCL, PRIVATE), "w+b")
+        self._file = os.fdopen(os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_EXCL, disk.PRIVATE), "w+b")
         self._file.write(before)
 
 

@@ -335,3 +335,18 @@ def test_a_prepared_statement_runs_with_either_style_of_parameters(paramstyle: s
         assert Prepared(query).first(conn, {"moment": moment}) == [moment, 7]
         assert Prepared(query.limit(0)).first(conn, {"moment": moment}) is None
     engine.dispose()
+
+
+@pytest.mark.backend("sqlite")
+def test_a_new_file_and_what_lies_beside_it_are_for_this_user_only(tmp_path: Path) -> None:
+    file = tmp_path / "new" / "h.db"
+    database = Database(f"sqlite:///{file}")
+    database.migrate()
+    try:
+        organisations_made = database.write(lambda conn: organisations.ensure(conn, "o"))
+        modes = {path.name: path.stat().st_mode & 0o777 for path in file.parent.iterdir() if path.is_file()}
+    finally:
+        database.close()
+    assert organisations_made.name == "o"
+    assert {"h.db", "h.db-wal"} <= set(modes)
+    assert set(modes.values()) == {0o600}
