@@ -276,8 +276,9 @@ def _other(heading: str, rate: float, what: str = "column") -> Problem:
         f"The {what} {heading} says {rate:.5g} samples per second, at which no signal is read. If it is one sensor's, "
         "say so in a mapping: each sensor's times, as "
         '{"linear_acceleration": {"time": {"column": ..., "unit": ...}}, "angular_velocity": {"time": {"column": ..., '
-        """"unit": ...}}}, or that one's rate, as {"angular_velocity": {"sample_rate_hz": ...}}. If it is of something """
-        'else, name the times that count in the mapping, as {"time": {"column": ..., "unit": ...}}, or say {"time": null} '
+        """"unit": ...}}}, or that one's rate, as {"angular_velocity": {"sample_rate_hz": ...}}. If it is of """
+        'something else, name the times that count in the mapping, as {"time": {"column": ..., "unit": ...}}, or say '
+        '{"time": null} '
         "in it where a rate counts.",
         "rate-differs",
         parameter="sample_rate_hz",
