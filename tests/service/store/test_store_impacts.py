@@ -457,7 +457,10 @@ def test_the_figures_for_the_planner_lead_to_the_indices(database, data_set) -> 
     with database.read() as conn:
         for query, index in (
             (impacts._SAME_EVENT._statement, "ix_impacts_data_set_id_input_digest_id"),
-            (impact_known._KNOWN._statement, "ix_impacts_data_set_id_updated_at_id"),
+            (impact_known._KNOWN_BY_NAME._statement, "ix_impacts_data_set_id_updated_at_id"),
+            (impact_known._KNOWN_BY_ID._statement, "ix_impacts_data_set_id_updated_at_id"),
+            (impacts._SAME_DELIVERY._statement, "ix_impacts_athlete_id_occurred_at_id"),
+            (impacts._FORMER._statement, "USING PRIMARY KEY (data_set_id=? AND digest=?)"),
         ):
             compiled = query.compile(dialect=conn.dialect)
             empty = tuple(compiled.params.get(name) for name in compiled.positiontup)
