@@ -87,7 +87,7 @@ class RefitOptions:
                 raise CalibrationError(
                     "criteria", f"Criteria are: {', '.join(CRITERION_KEYS)}; a plus sign joins some."
                 )
-        if len(set(self.criteria)) < len(self.criteria):
+        if len({frozenset(parts_of(name)) for name in self.criteria}) < len(self.criteria):
             raise CalibrationError("criteria", "Each criterion may be named once.")
         if self.sampling not in SAMPLINGS:
             raise CalibrationError("sampling", f"The sampling is one of: {', '.join(SAMPLINGS)}.")

@@ -29,6 +29,8 @@ from headimpact_service.ingest.zip_guard import GuardedZip
 
 PRESET = "iso_mme"
 MAX_CHANNELS = 2000
+SHORTEST_CODE = 10
+"""Characters of what may be a channel's code; a file that says less is what the list calls it."""
 MAX_NAMED = 10
 """Absent channels that a note names; of more it says how many."""
 
@@ -120,7 +122,8 @@ class _Test:
         if number in self.listed and head_code(self.listed[number]) is None:
             return None
         header, _ = self._file(number)
-        code = head_code(header.text("channel code") or self.listed.get(number, ""))
+        said = header.text("channel code") or ""
+        code = head_code(said if len(said) >= SHORTEST_CODE else self.listed.get(number, said))
         if code is None:
             return None
         self.begin.add(header.number("time of first sample") is not None or self._refers(header))

@@ -51,6 +51,12 @@ def test_a_set_is_read_wherever_it_lies_and_however_its_text_is_encoded(folder, 
     assert prepare(recording).kinematics.samples == SAMPLES
 
 
+def test_a_channel_whose_file_says_no_code_is_what_the_list_calls_it():
+    record = one(changed(channel_code="x"))
+    assert peaks(record, "linear_acceleration") == pytest.approx([30.0, -12.0, 7.5])
+    assert record.notes == ()
+
+
 def test_what_was_filtered_before_is_kept_in_the_source():
     metadata = one(iso_mme()).metadata
     assert metadata["filtered_before"]["linear_acceleration_x"] == "CFC1000"

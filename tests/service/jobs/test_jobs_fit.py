@@ -274,6 +274,7 @@ class TestFit:
         [
             ({"criteria": ["nonsense"]}, "/criteria/0"),
             ({"criteria": ["bam", "bam"]}, "/criteria"),
+            ({"criteria": ["bam+bric", "bric+bam"]}, "/criteria"),
             ({"criteria": []}, "/criteria"),
             ({"incidence": 0}, "/incidence"),
             ({"incidence_range": [0.5, 0.1]}, "/incidence_range"),
