@@ -46,7 +46,7 @@ def _known(name: str) -> str:
 
 
 def _distinct(names: list[str]) -> list[str]:
-    if len(set(names)) < len(names):
+    if len({frozenset(name.split("+")) for name in names}) < len(names):
         raise ValueError("Each criterion may be named once.")
     return names
 
