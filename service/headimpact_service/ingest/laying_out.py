@@ -12,6 +12,7 @@ from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.layout import Clock, Component, Layout, SignalLayout
 from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS, DateAndTime, Mapping, SignalColumns
 from headimpact_service.ingest.no_signal import no_signal
+from headimpact_service.ingest.presets import unit_of
 from headimpact_service.ingest.scaled_units import SCALED_UNITS, unit_written
 from headimpact_service.ingest.spelling import unit_ending, unit_spelled
 from headimpact_service.ingest.supplied import Kind, Supplied, supplied_in
@@ -104,7 +105,8 @@ def _require_unit_written(name: SignalName, columns: SignalColumns, headings: He
         beside = headings.units.get(column)
         if unit_spelled(name, beside) is not None:  # as it does for a signal without a unit
             continue
-        written = unit_written(heading) or (unit_written(f"[{beside}]") if beside else None)
+        worded = unit_of(heading)
+        written = {worded} if worded else unit_written(heading) or (unit_written(f"[{beside}]") if beside else None)
         if written is not None and columns.unit not in written:
             raise layout_problem(
                 f"The column {heading} of the {name} is said to be in {columns.unit}, and the file says "

@@ -72,7 +72,7 @@ class SignalColumns(Strict):
 class LinearAccelerationColumns(SignalColumns):
     """Columns of linear acceleration."""
 
-    unit: Literal["g", "m/s^2", "mg", "cm/s^2", "mm/s^2"] | None = None
+    unit: Literal["g", "m/s^2", "mg", "cm/s^2", "mm/s^2", "ft/s^2"] | None = None
 
 
 class AngularVelocityColumns(SignalColumns):

@@ -11,6 +11,7 @@ SCALED_UNITS: dict[str, tuple[str, float]] = {
     "mg": ("g", 1e-3),
     "cm/s^2": ("m/s^2", 1e-2),
     "mm/s^2": ("m/s^2", 1e-3),
+    "ft/s^2": ("m/s^2", 0.3048),
     "mrad/s": ("rad/s", 1e-3),
     "mdeg/s": ("deg/s", 1e-3),
     "rpm": ("deg/s", 6.0),
@@ -46,7 +47,13 @@ def known_units() -> frozenset[str]:
 @cache
 def _spellings() -> tuple[tuple[str, str], ...]:
     """Every spelling of a unit of a signal, with a prefix and without, and the unit."""
-    found: dict[tuple[str, str], None] = {("rpm", "rpm"): None, ("r/min", "rpm"): None}
+    found: dict[tuple[str, str], None] = dict.fromkeys(
+        (
+            *((spelling, "rpm") for spelling in ("rpm", "r/min", "rev/min", "1/min")),
+            ("ft/s2", "ft/s^2"),
+            ("ft/s/s", "ft/s^2"),
+        )
+    )
     for unit, spellings in (one for signal in SIGNALS for one in spellings_of(signal)):
         for spelling in spellings:
             found[spelling, unit] = None

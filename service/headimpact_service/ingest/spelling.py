@@ -79,7 +79,12 @@ def unit_at_end(quantity: str, heading: str) -> tuple[str, str] | None:
 
 def ending(heading: str, spellings: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str, str]]:
     """The spellings that end a heading as a word of their own: what stands before each, it, and the unit it is of."""
-    text = unicodedata.normalize("NFKC", heading[:MAX_COMPACT]).casefold().replace("^", "").rstrip(" )]")
+    text = (
+        unicodedata.normalize("NFKC", heading[:MAX_COMPACT].translate(_WORDED))
+        .casefold()
+        .replace("^", "")
+        .rstrip(" )]")
+    )
     for spelling, unit in spellings:
         rest = text.removesuffix(spelling)
         if rest != text and rest and not rest[-1].isalnum():

@@ -796,6 +796,26 @@ def test_a_mappings_unit_must_be_that_of_the_heading(signal: str, unit: str, wri
 
 
 @pytest.mark.parametrize(
+    ("signal", "unit", "heading"),
+    [
+        *(
+            ("linear_acceleration", "m/s^2", name)
+            for name in ("a{}_g", "acc_{}_g", "linear_acceleration_{}_g", "Accel {} g")
+        ),
+        *(("linear_acceleration", "g", name) for name in ("a{}_ms2", "a{}_m_s2", "acc_{}_ms2", "Acc {} (ft/s^2)")),
+        *(("angular_velocity", "deg/s", name) for name in ("w{}_rad_s", "gyro_{}_rad_s", "angular_velocity_{}_rad_s")),
+        *(("angular_velocity", "rad/s", name) for name in ("gyro_{}_deg_s", "Gyro {} [°/s]", "Gyro {} (rev/min)")),
+        ("angular_velocity", "deg/s", "Gyro {} [1/min]"),
+    ],
+)
+def test_a_mappings_unit_must_be_that_of_a_heading_of_known_words(signal: str, unit: str, heading: str):
+    columns = {axis: heading.format(axis) for axis in "xyz"}
+    document = {signal: {"unit": unit, **columns}, "time": {"column": "t_ms", "unit": "ms"}}
+    problem = refused(table(",".join(["t_ms", *columns.values()])), mapping=mapping(document))
+    assert codes(problem) == [(f"/{signal}/unit", "units-differ")]
+
+
+@pytest.mark.parametrize(
     ("signal", "unit", "written", "base", "size"),
     [
         ("linear_acceleration", "mg", " (mg)", "g", 1e-3),

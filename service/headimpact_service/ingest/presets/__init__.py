@@ -190,6 +190,12 @@ def single_axes(headings: Headings) -> list[str]:
     return [heading for heading, meaning in told if meaning is not None and meaning.signal is not None]
 
 
+def unit_of(heading: str) -> str | None:
+    """The unit of a signal that a heading names, if it is made of known words."""
+    meaning = _vocabulary(generic().name).understand(heading)
+    return None if meaning is None or meaning.signal is None else meaning.unit
+
+
 def fitting(headings: Headings, *, but: str | None) -> list[str]:
     """The presets whose columns a table has all, `but` the one that it is read by and the generic ones."""
     tables = (preset for preset in presets().values() if preset.format == "table" and preset.vocabulary is None)
