@@ -9,7 +9,7 @@ from sqlalchemy import BindParameter, Connection, bindparam, delete, insert, sel
 from headimpact_service.store import duplicates, jobs
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
-from headimpact_service.store.impact_rows import former_content
+from headimpact_service.store.impact_rows import former_content, former_event, former_input
 from headimpact_service.store.many import in_parts
 from headimpact_service.store.tables import former_contents, impact_revisions, impacts, labels, scores
 
@@ -24,6 +24,9 @@ _ENTOMB = update(impacts).where(
 _IDS: BindParameter[Any] = bindparam("impact_ids", expanding=True)
 _DELIVERED = select(impact_revisions.c.impact_id, impact_revisions.c.content_digest).where(
     impact_revisions.c.impact_id.in_(_IDS)
+)
+_EVENTS = select(impacts.c.id, impacts.c.athlete_id, impacts.c.occurred_at, impacts.c.input_digest).where(
+    impacts.c.data_set_id == bindparam("data_set_id"), impacts.c.id.in_(_IDS), impacts.c.input_digest.is_not(None)
 )
 _FORGET = delete(former_contents).where(former_contents.c.impact_id == bindparam("impact"))
 _FORGET_ONE = _FORGET.where(former_contents.c.digest == bindparam("of_digest"))
@@ -58,6 +61,7 @@ def erase_impacts(conn: Connection, data_set_id: bytes, impact_ids: list[bytes],
         conn.execute(_FORGET, [{"impact": impact_id} for impact_id in impact_ids])
     else:
         remember(conn, data_set_id, impact_ids)
+        _remember_events(conn, data_set_id, impact_ids)
     duplicates.release(conn, data_set_id, impact_ids)
     for statement in _CONTENTS:
         conn.execute(statement, [{"impact": impact_id} for impact_id in impact_ids])
@@ -80,6 +84,19 @@ def remember(conn: Connection, data_set_id: bytes, impact_ids: list[bytes]) -> N
         kept = {(former_content(data_set_id, content), impact_id) for impact_id, content in delivered}
         rows = [{"data_set_id": data_set_id, "digest": digest, "impact_id": of} for digest, of in sorted(kept)]
         conn.execute(insert(former_contents), rows)
+
+
+def _remember_events(conn: Connection, data_set_id: bytes, impact_ids: list[bytes]) -> None:
+    """Keep what tells the events that are deleted from any other: a file may say less or more of their context."""
+    for part in in_parts(impact_ids):
+        events = conn.execute(_EVENTS, {"data_set_id": data_set_id, "impact_ids": part}).all()
+        kept = [(former_input(data_set_id, digest), impact_id) for impact_id, _, _, digest in events]
+        kept += [
+            (former_event(data_set_id, whose, when, digest), impact_id) for impact_id, whose, when, digest in events
+        ]
+        rows = [{"data_set_id": data_set_id, "digest": digest, "impact_id": of} for digest, of in kept]
+        if rows:
+            conn.execute(insert(former_contents), rows)
 
 
 def erase_athletes_impacts(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> None:

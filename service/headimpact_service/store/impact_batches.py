@@ -20,7 +20,7 @@ from headimpact_service.store import impacts as impact_store
 from headimpact_service.store.clock import next_change
 from headimpact_service.store.columns import MICROSECOND
 from headimpact_service.store.impact_inserts import first_row, insert_rows
-from headimpact_service.store.impact_rows import NewImpact, external_id_digest, former_content
+from headimpact_service.store.impact_rows import NewImpact, external_id_digest, former_content, former_input
 from headimpact_service.store.many import ASKED_AT_ONCE, in_parts
 from headimpact_service.store.tables import athletes, devices, former_contents, impacts
 
@@ -81,6 +81,8 @@ def _perhaps_known(conn: Connection, data_set_id: bytes, news: Sequence[NewImpac
     known_contents = _known(conn, data_set_id, _CONTENTS, contents)
     deliveries = [former_content(data_set_id, new.content_digest) for new in news]
     former = _known(conn, data_set_id, _FORMER, deliveries)
+    inputs = [former_input(data_set_id, new.input_digest) for new in news]
+    deleted = _known(conn, data_set_id, _FORMER, inputs)
     remounted = _remounted(conn, data_set_id, news)
     return {
         index
@@ -89,6 +91,7 @@ def _perhaps_known(conn: Connection, data_set_id: bytes, news: Sequence[NewImpac
         or names[index] in known_names
         or contents[index] in known_contents
         or deliveries[index] in former
+        or inputs[index] in deleted
         or (new.mounted_by_device and new.device_serial in remounted)
     }
 

@@ -181,3 +181,16 @@ def external_id_digest(data_set_id: bytes, external_id: str | None) -> bytes | N
 def former_content(data_set_id: bytes, content_digest: bytes) -> bytes:
     """What is kept of a former content: who has the content can tell that it was there, and nobody else."""
     return blake2b(content_digest, key=data_set_id, digest_size=16).digest()
+
+
+def former_input(data_set_id: bytes, input_digest: bytes) -> bytes:
+    """The same of what a deleted impact's score was computed from, whosever it was."""
+    return former_content(data_set_id, b"input" + input_digest)
+
+
+def former_event(
+    data_set_id: bytes, athlete_id: bytes | None, occurred_at: datetime | None, input_digest: bytes
+) -> bytes:
+    """The same of a deleted impact of an athlete and an instant."""
+    when = b"" if occurred_at is None else occurred_at.isoformat().encode()
+    return former_content(data_set_id, b"event" + (athlete_id or b"").ljust(16, b"\0") + when + input_digest)

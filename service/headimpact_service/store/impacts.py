@@ -36,6 +36,7 @@ from headimpact_service.store.impact_rows import (
     ScoreOutdated,
     external_id_digest,
     former_content,
+    former_event,
 )
 from headimpact_service.store.prepared import Prepared
 from headimpact_service.store.revision import require_revision
@@ -118,7 +119,7 @@ def add(conn: Connection, data_set_id: bytes, new: NewImpact, *, same_event_is_u
     if known.same_external_id is not None:
         return _redelivery(conn, data_set_id, new, known, known.same_external_id)
     if same_event_is_unchanged:
-        there = _same_event(conn, data_set_id, new, known) or _former(conn, data_set_id, new)
+        there = _same_event(conn, data_set_id, new, known) or _former(conn, data_set_id, new, known)
         if there is not None:
             return Outcome("unchanged", there)
     _require_present(new, known)
@@ -168,10 +169,19 @@ def _require_same_marks(new: NewImpact, present: Impact) -> None:
         )
 
 
-def _former(conn: Connection, data_set_id: bytes, new: NewImpact) -> Impact | None:
-    """The impact that was delivered just so and was corrected since; 409 `impact-deleted` where it was deleted."""
-    digest = former_content(data_set_id, new.content_digest)
-    found = _FORMER.first(conn, {"data_set_id": data_set_id, "former_content": digest})
+def _former(conn: Connection, data_set_id: bytes, new: NewImpact, known: Known) -> Impact | None:
+    """The impact that was delivered just so and was corrected since.
+
+    Raises
+    ------
+    Problem
+        409 `impact-deleted` where it, or the same event of the same athlete, was deleted.
+    """
+    digests = [former_content(data_set_id, new.content_digest)]
+    if known.athlete is not None or new.athlete_external_id is None:
+        digests.append(former_event(data_set_id, known.athlete, new.occurred_at, new.input_digest))
+    parameters = ({"data_set_id": data_set_id, "former_content": digest} for digest in digests)
+    found = next(filter(None, (_FORMER.first(conn, asked) for asked in parameters)), None)
     if found is None:
         return None
     if found[1] is not None:

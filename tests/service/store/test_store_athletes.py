@@ -73,7 +73,7 @@ class TestErase:
         database.write(lambda conn: impacts.correct(conn, data_set, later.id, corrected))
         kept = select(func.count()).select_from(former_contents)
         with database.read() as conn:
-            assert conn.execute(kept).scalar() == 2
+            assert conn.execute(kept).scalar() == 4
         database.write(lambda conn: athletes.erase(conn, data_set, later.athlete_id))
         with database.read() as conn:
             assert conn.execute(kept).scalar() == 0

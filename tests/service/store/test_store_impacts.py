@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import func, select
 
 from headimpact_service.errors import Problem
-from headimpact_service.store import athletes, devices, ids, impact_known, impacts, keys, scores
+from headimpact_service.store import athletes, devices, ids, impact_batches, impact_known, impacts, keys, scores
 from headimpact_service.store.athletes import AthleteFields
 from headimpact_service.store.database import Database
 from headimpact_service.store.impacts import Impact, ImpactFilters, NewImpact, Outcome
@@ -287,6 +287,38 @@ class TestFormerContent:
             assert caught.value.slug == "impact-deleted"
         assert add(database, data_set, make_impact("a", external_id=None)).status == "created"
         assert self.bring(database, data_set, make_impact("a", external_id=None)).status == "unchanged"
+
+    def test_a_deleted_event_does_not_come_back_with_less_said_of_it(self, database, data_set, make_impact) -> None:
+        nameless = {"external_id": None}
+        first = self.bring(database, data_set, make_impact("a", **nameless)).impact
+        moved = replace(
+            make_impact("a", **nameless, athlete_external_id="p-9"),
+            session_id="s-9",
+            content_digest=sha256(b"with its session").digest(),
+        )
+        self.correct(database, data_set, first, moved)
+        again = replace(make_impact("a", **nameless, athlete_external_id="p-9"), content_digest=sha256(b"x").digest())
+        assert self.bring(database, data_set, again).status == "unchanged"
+        database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        with pytest.raises(Problem) as caught:
+            self.bring(database, data_set, again)
+        [together] = database.write(lambda conn: impact_batches.add_many(conn, data_set, [again]))
+        assert isinstance(together, Problem)
+        assert (caught.value.slug, together.slug) == ("impact-deleted", "impact-deleted")
+        elsewhere = replace(again, occurred_at=datetime(2026, 1, 2, tzinfo=UTC))
+        assert self.bring(database, data_set, elsewhere).status == "created"
+
+    def test_a_deleted_event_of_a_merged_athlete_does_not_come_back(self, database, data_set, make_impact) -> None:
+        first = self.bring(database, data_set, make_impact("a", external_id=None, athlete_external_id="p-1")).impact
+        other = self.bring(database, data_set, make_impact("b", external_id=None, athlete_external_id="p-2")).impact
+        database.write(lambda conn: athletes.merge(conn, data_set, first.athlete_id, other.athlete_id))
+        database.write(lambda conn: impacts.delete(conn, data_set, first.id))
+        again = replace(
+            make_impact("a", external_id=None, athlete_external_id="p-2"), content_digest=sha256(b"as p-2").digest()
+        )
+        with pytest.raises(Problem) as caught:
+            self.bring(database, data_set, again)
+        assert caught.value.slug == "impact-deleted"
 
     def test_a_device_that_is_mounted_anew_makes_no_new_impacts(self, database, data_set, make_impact) -> None:
         mounted = {"external_id": None, "mounted_by_device": True}
