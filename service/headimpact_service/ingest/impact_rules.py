@@ -56,8 +56,14 @@ def require_recorded(record: ImpactRecord) -> None:
         422 `invalid-trace`.
     """
     plane = record.recording.constrained_plane
-    if plane is None or not record.left_out:
+    if not record.left_out:
         return
+    if plane is None:  # of a table, in which a column says the plane of each impact
+        detail = (
+            f"The {words(record.left_out[0][0])} has not all its axes, and the impact names no plane of its motion."
+        )
+        error = PayloadError(detail=detail, code="missing", pointer="/kinematics/constrained_plane")
+        raise Problem("invalid-trace", detail, errors=[error])
     errors = []
     for signal, axis in record.left_out:
         parts = _rotation(signal, record.recording)[:, AXES.index(axis)]

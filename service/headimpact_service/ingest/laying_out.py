@@ -10,7 +10,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.headings import Headings, layout_problem
 from headimpact_service.ingest.impact_rules import missing_axes
 from headimpact_service.ingest.layout import Clock, Component, Layout, SignalLayout
-from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS, DateAndTime, Mapping, SignalColumns
+from headimpact_service.ingest.mapping import DATES_IN, TIME_UNITS, DateAndTime, Mapping, ReadingField, SignalColumns
 from headimpact_service.ingest.no_signal import no_signal
 from headimpact_service.ingest.presets import unit_of
 from headimpact_service.ingest.scaled_units import SCALED_UNITS, unit_written
@@ -71,9 +71,9 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: fr
     if name not in required and all(component is None for component in components.values()):
         return None
     given = [axis for axis, component in components.items() if component is not None]
-    mounted = (mapping.reading or {}).get("mounting")
-    turned = mapping.location == "sensor" or (mounted is not None and headings.find(mounted) is not None)
-    for axis in missing_axes(name, given, mapping.constrained_plane, turned=turned):
+    turned = mapping.location == "sensor" or _is_read("mounting", mapping, headings)
+    each_says = bool(given) and _is_read("constrained_plane", mapping, headings)  # held against its plane
+    for axis in () if each_says else missing_axes(name, given, mapping.constrained_plane, turned=turned):
         raise _missing(f"The column of {name} {axis} was not found.", f"/{name}/{axis}")
     x, y, z = (components[axis] or Component(None, 1.0) for axis in AXES)
     _require_distinct(name, (x, y, z))
@@ -90,6 +90,12 @@ def _signal(name: SignalName, mapping: Mapping, headings: Headings, required: fr
         sample_rate_hz=columns.sample_rate_hz,
         full_scale=None if columns.range is None else columns.range * size,
     )
+
+
+def _is_read(field: ReadingField, mapping: Mapping, headings: Headings) -> bool:
+    """Whether a column says how each impact is to be read in this respect."""
+    spelled = (mapping.reading or {}).get(field)
+    return spelled is not None and headings.find(spelled) is not None
 
 
 def _scaled(component: Component, size: float) -> Component:

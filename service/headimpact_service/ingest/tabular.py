@@ -25,6 +25,7 @@ from headimpact_service.ingest.presets import (
     beside_signals,
     fitting,
     generic,
+    names_plane,
     preset_named,
     recognise,
     signals_of_presets,
@@ -132,7 +133,7 @@ def _preset(headings: Headings, options: ImportOptions) -> Preset | None:
     if options.mapping is not None and _names_signals(options.mapping):
         return None
     found = recognise(headings)
-    is_planar = options.mapping is not None and options.mapping.constrained_plane is not None
+    is_planar = names_plane(headings) or (options.mapping is not None and options.mapping.constrained_plane is not None)
     return generic() if found is None and is_planar else found  # of which no signal needs to be whole
 
 

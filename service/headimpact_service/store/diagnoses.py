@@ -144,6 +144,12 @@ def join(conn: Connection, data_set_id: bytes, athlete_id: bytes, key_id: bytes 
         if times > 1:
             with suppress(Problem):  # none of the session's impacts carries it
                 add(conn, data_set_id, athlete_id, said, key_id)
+    for session_id in {said.session_id for said in counted}:
+        session = {"data_set_id": data_set_id, "athlete_id": athlete_id, "session_id": session_id}
+        rows = [_Candidate(*row) for row in conn.execute(_OF_SESSION, session)]
+        diagnosed = [row.id for row in rows if row.outcome == "concussion" and row.diagnosis_id is not None]
+        for weaker in diagnosed[1:]:  # a session has one that nobody saw, whoever diagnosed it
+            labels.withdraw(conn, data_set_id, weaker, key_id)
 
 
 def _known(conn: Connection, data_set_id: bytes, athlete_id: bytes, new: NewDiagnosis) -> list[Diagnosis]:

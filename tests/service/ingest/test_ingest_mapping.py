@@ -22,6 +22,7 @@ from headimpact_service.ingest.mapping import Mapping, merge
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import list_presets, presets, recognise
 from headimpact_service.ingest.record import ImpactRecord
+from headimpact_service.intake.scoring import UNKNOWN_DEVICE, Scored, Terms, score_records
 
 MAPPED = {
     "linear_acceleration": {"unit": "m/s^2", "x": "front", "y": "-right", "z": ["up", "top"]},
@@ -155,6 +156,23 @@ def test_a_plane_alone_makes_headings_of_single_axes_known():
     assert peaks(recording.angular_velocity) == [0.0, 3.0, 0.0]
     other = refused(text, mapping=mapping({"constrained_plane": "coronal"}))
     assert codes(other) == [("/linear_acceleration/y", "column-missing")]
+
+
+def test_a_column_may_say_the_plane_of_each_impact():
+    def rows(plane: str, name: str) -> list[str]:
+        return [f"{name},{plane},{n},{n % 7},{n % 5},{n % 3}" for n in range(40)]
+
+    heading = "impact_id,constrained_plane,t_ms,ax_g,az_g,wy_rad_s"
+    text = "\n".join([heading, *rows("sagittal", "1"), *rows("coronal", "2"), *rows("", "3")])
+    found = score_records(
+        [(record, UNKNOWN_DEVICE) for record in read(text) if isinstance(record, ImpactRecord)], Terms()
+    )
+    assert isinstance(found[0], Scored)
+    assert found[0].record.recording.constrained_plane == "sagittal"
+    assert [isinstance(one, Problem) and one.errors[0].pointer for one in found[1:]] == [
+        "/kinematics/linear_acceleration/y",
+        "/kinematics/constrained_plane",
+    ]
 
 
 def test_a_constrained_plane_needs_only_its_own_columns():

@@ -67,6 +67,17 @@ class TestAgain:
         assert (again.status_code, again.json()["impact"]) == (201, stronger)
         assert [outcome(api, impact) for impact in (mine, *others, stronger)] == [None, None, None, "concussion"]
 
+    def test_two_registrations_diagnosed_by_two_have_one_concussion(self, api: Api) -> None:
+        mine = in_session(api, "e-1", 1.0)
+        body = impact_body("o-1", 2.0, athlete={"external_id": "p-18"}, context={"session_id": "s-1"})
+        theirs = api.post("/v1/impacts", json=body).json()["id"]
+        athlete, other = athlete_of(api, mine), athlete_of(api, theirs)
+        diagnose(api, athlete, diagnosed_by="clinician-1")
+        diagnose(api, other, diagnosed_by="clinician-2")
+        assert api.post(f"/v1/athletes/{other}/merge", json={"into": athlete}).status_code == 200
+        assert (outcome(api, mine), outcome(api, theirs)) == (None, "concussion")
+        assert len(api.get(f"/v1/athletes/{athlete}/diagnoses").json()["data"]) == 2
+
     def test_without_another_impact_it_is_the_conflict_of_a_session_without_any(self, api: Api) -> None:
         impact = in_session(api, "e-1", 1.0)
         athlete = athlete_of(api, impact)

@@ -184,6 +184,12 @@ def generic() -> Preset:
     return next(preset for preset in presets().values() if preset.vocabulary is not None)
 
 
+def names_plane(headings: Headings) -> bool:
+    """Whether a column says the plane of each impact's motion."""
+    spelled = (generic().mapping.reading or {}).get("constrained_plane")
+    return spelled is not None and headings.find(spelled) is not None
+
+
 def single_axes(headings: Headings) -> list[str]:
     """The columns that are said to be a component of a signal, whether or not its others are there."""
     told = zip(headings.written, _vocabulary(generic().name).meanings(headings), strict=True)
