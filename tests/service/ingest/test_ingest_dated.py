@@ -16,6 +16,7 @@ from ingest_files import codes, one, read, refused, six_axis
 from headimpact.errors import TraceError
 from headimpact.preparation import prepare
 from headimpact_service.ingest.dated import MAX_DAYS, Elapsed
+from headimpact_service.ingest.guarded.xlsx_file import SheetTable, _Block
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 
@@ -267,3 +268,13 @@ def test_cells_of_a_workbook_s_own_type_are_read():
     typed = rb'<c r="\1" t="d"><v>\2</v></c>'
     written = rb'<c r="(A[0-9]+)" t="inlineStr"><is><t>(2026[^<]*)</t></is></c>'
     assert rate_of(one(with_part(book, SHEET, lambda part: re.sub(written, typed, part)))) == 1000.0
+
+
+def test_a_workbook_s_midnight_is_a_time():
+    day = dt.datetime(2026, 10, 3, tzinfo=dt.UTC).replace(tzinfo=None)
+    cells = [day - dt.timedelta(milliseconds=1), day.date(), day + dt.timedelta(milliseconds=1)]
+    block = _Block([0], ["time"], [""], [[cell] for cell in cells])
+    table = SheetTable([block], [])
+    assert table.dated == {0}
+    [read_columns] = table.blocks([0], [])
+    np.testing.assert_allclose(read_columns.numbers[0], [0.0, 1000.0, 2000.0])

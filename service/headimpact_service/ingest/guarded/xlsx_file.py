@@ -154,7 +154,7 @@ class SheetTable:
         return values
 
     def _microseconds(self, cell: Any) -> float:  # noqa: ANN401 - any cell
-        return self._elapsed.microseconds(_text(cell))
+        return self._elapsed.microseconds(_time(cell) or _text(cell))
 
     def _texts(self, place: int) -> list[str]:
         block, column = self._places[place]
@@ -206,7 +206,9 @@ def _word(cell: Any) -> str:  # noqa: ANN401 - any cell
 
 
 def _time(cell: Any) -> str:  # noqa: ANN401 - any cell
-    """A cell that may be a time, as text."""
+    """A cell that may be a time, as text; a date that has none is midnight's, as a workbook keeps it."""
+    if isinstance(cell, dt.date) and not isinstance(cell, dt.datetime):
+        return f"{cell.isoformat()}T00:00:00"
     return cell.isoformat() if isinstance(cell, dt.datetime | dt.time) else _word(cell)
 
 
