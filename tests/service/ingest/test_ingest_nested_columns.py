@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,7 @@ SHAPES: dict[str, dict[str, Any]] = {
     "structs within structs": of_impacts(lambda one: {"of": by_axis(one)}),
     "a struct a sample": of_samples(by_axis, POINT),
     "a vector a sample": of_samples(np.ndarray.tolist, pa.list_(pa.float64(), 3)),
+    "a list of three a sample": of_samples(np.ndarray.tolist, pa.list_(pa.float64())),
 }
 MAPPING = {
     name: {"unit": unit} | {axis: f"{column}_of_{axis}" for axis in "xyz"}
@@ -139,3 +141,31 @@ def test_thousands_of_parts_are_too_many_columns():
 def test_a_table_without_rows_is_laid_out_by_its_types():
     empty = pa.table({NAMES[0]: pa.array([], pa.list_(pa.list_(pa.float64()))), NAMES[1]: pa.array([], POINT)})
     assert refused(parquet(empty)).status == 422
+
+
+def test_three_numbers_beside_lists_of_samples_are_no_vectors_of_samples():
+    columns = {f"{name}_{axis}": noise(9)[..., at].tolist() for at, (name, axis) in enumerate(product(NAMES, "xyz"))}
+    found = read(parquet(pa.table(columns | {"place_mm": [[70.0, 0.0, -60.0]] * 9})), sample_rate_hz=1000.0)
+    assert [isinstance(record, ImpactRecord) for record in found] == [True] * 9
+
+
+@pytest.mark.parametrize(
+    "kind", [pa.time64("us"), pa.time64("ns"), pa.time32("ms"), pa.duration("us"), pa.timestamp("us")], ids=str
+)
+def test_times_of_any_type_are_those_of_samples(kind: pa.DataType):
+    begins = 43_200_000 if pa.types.is_time(kind) else 0
+    per_ms = {"ms": 1, "us": 1000, "ns": 1_000_000}[kind.unit]
+    stamps = [(begins + 2 * number) * per_ms for number in range(SAMPLES)]
+    table = of_samples(np.ndarray.tolist, pa.list_(pa.float64(), 3))
+    whole = pa.int64() if kind.bit_width == 64 else pa.int32()
+    a_sample = {name: column for name, column in table.items() if name != "t_ms"}
+    a_sample["time"] = pa.array(stamps * IMPACTS, whole).cast(kind)
+    an_impact = of_impacts(np.ndarray.tolist)
+    an_impact["time"] = pa.array([stamps] * IMPACTS, pa.list_(whole)).cast(pa.list_(kind))
+    for columns in (a_sample, an_impact):
+        found = read(parquet(pa.table(columns)))
+        assert len(found) == IMPACTS
+        for record in found:
+            assert isinstance(record, ImpactRecord), record.as_dict()
+            for _, signal in record.recording.signals():
+                assert signal.sample_rate_hz == 500.0

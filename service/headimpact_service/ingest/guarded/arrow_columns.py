@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from headimpact_service.ingest.cells import Words, number_text
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, are_dated
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, stated, unreadable
-from headimpact_service.ingest.guarded.nested_columns import Batches, laid_out
+from headimpact_service.ingest.guarded.nested_columns import Batches, is_list, laid_out
 from headimpact_service.ingest.heading_rows import LOOK
 from headimpact_service.ingest.table import Columns, FloatArray
 
@@ -39,9 +39,12 @@ def is_number(kind: pa.DataType) -> bool:
 
 def is_list_of_numbers(kind: pa.DataType) -> bool:
     """Whether cells of this type are lists of samples."""
-    types = pa.types
-    lists = types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
-    return bool(lists and is_number(kind.value_type))
+    return is_list(kind) and is_number(kind.value_type)
+
+
+def _is_instant(kind: pa.DataType) -> bool:
+    """Whether cells of this type are times of a day, with its date or without."""
+    return bool(pa.types.is_timestamp(kind) or pa.types.is_time(kind))
 
 
 class ArrowTable:
@@ -59,24 +62,25 @@ class ArrowTable:
         self.dated: frozenset[int] = frozenset()
         self._elapsed = Elapsed()
         self.wordless = [place for place, kind in enumerate(self._types) if not is_told(kind)]
-        if not self.parted:  # times that say their unit by their type; those of an impact as a whole are text
-            durations = (place for place, kind in enumerate(self._types) if pa.types.is_duration(kind))
-            self.units = dict.fromkeys(durations, MICROSECONDS) | self.units
-            self.dated = frozenset({*self._places(pa.types.is_timestamp), *self._written_times()})
+        self.units = dict.fromkeys(self._samples(pa.types.is_duration), MICROSECONDS) | self.units
+        self.dated = frozenset({*self._samples(_is_instant), *self._written_times()})
 
-    def _places(self, is_kind: Callable[[pa.DataType], bool]) -> list[int]:
-        return [place for place, kind in enumerate(self._types) if is_kind(kind)]
+    def _samples(self, is_kind: Callable[[pa.DataType], bool]) -> list[int]:
+        """The columns whose samples are of such a type; where rows are impacts, samples stand in lists."""
+        if not self.parted:
+            return [place for place, kind in enumerate(self._types) if is_kind(kind)]
+        return [place for place, kind in enumerate(self._types) if is_list(kind) and is_kind(kind.value_type)]
 
     def _written_times(self) -> Iterator[int]:
         """Columns of times that are text, by their first rows."""
-        texts = self._places(is_text)
+        texts = [] if self.parted else self._samples(is_text)
         batch = next((batch for batch in self._batches(texts) if batch.num_rows), None) if texts else None
         if batch is not None:
             yield from (place for place, column in zip(texts, batch.columns, strict=True) if _is_dated(column))
 
     def has_samples(self, place: int) -> bool:
         """Where rows are impacts, lists of numbers do; where they are samples, numbers and times."""
-        return is_list_of_numbers(self._types[place]) if self.parted else self._holds_numbers(place)
+        return self._holds_numbers(place) and (not self.parted or is_list(self._types[place]))
 
     def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Columns]:
         """The asked-for columns; those of lists end to end, with the length of each impact."""
@@ -102,8 +106,9 @@ class ArrowTable:
 
     def _holds_numbers(self, place: int) -> bool:
         kind = self._types[place]
-        is_duration = pa.types.is_duration(kind) and not self.parted
-        return is_number(kind) or is_list_of_numbers(kind) or is_duration or place in self.dated
+        if is_number(kind) or is_list_of_numbers(kind) or place in self.dated:
+            return True
+        return place in self._samples(pa.types.is_duration)
 
 
 def is_text(kind: pa.DataType) -> bool:
@@ -125,17 +130,28 @@ def is_told(kind: pa.DataType) -> bool:
     types = pa.types
     kind = kind.value_type if types.is_dictionary(kind) else kind
     told = (types.is_null, types.is_string, types.is_large_string, types.is_integer, types.is_floating)
-    return any(is_one(kind) for is_one in (*told, types.is_timestamp, types.is_boolean, types.is_date))
+    return any(is_one(kind) for is_one in (*told, types.is_timestamp, types.is_time, types.is_boolean, types.is_date))
 
 
 def floats(column: pa.Array) -> FloatArray:
     """A column of numbers, of times in microseconds; NaN where a cell is empty."""
-    if pa.types.is_timestamp(column.type):
-        column = column.cast(pa.timestamp(MICROSECONDS, column.type.tz), safe=False).cast(pa.int64())
-    elif pa.types.is_duration(column.type):
-        column = column.cast(pa.duration(MICROSECONDS), safe=False).cast(pa.int64())
+    column = _in_microseconds(column)
     cast = column.cast(pa.float64(), safe=False)
     return np.ascontiguousarray(cast.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _in_microseconds(column: pa.Array) -> pa.Array:
+    """Times as whole numbers of them; what is no time stays as it is."""
+    kind = column.type
+    if pa.types.is_timestamp(kind):
+        column = column.cast(pa.timestamp(MICROSECONDS, kind.tz), safe=False)
+    elif pa.types.is_duration(kind):
+        column = column.cast(pa.duration(MICROSECONDS), safe=False)
+    elif pa.types.is_time(kind):
+        column = column.cast(pa.time64(MICROSECONDS), safe=False)
+    else:
+        return column
+    return column.cast(pa.int64())
 
 
 def words(column: pa.Array) -> Words:
@@ -161,6 +177,9 @@ def _texts(values: pa.Array) -> list[str]:
         return ["" if value is None else _instant(value, placed=kind.tz is not None) for value in micros]
     if pa.types.is_boolean(kind):
         return ["" if value is None else str(value).lower() for value in values.to_pylist()]
+    if pa.types.is_time(kind):
+        micros = values.cast(pa.time64(MICROSECONDS), safe=False).to_pylist()
+        return ["" if value is None else value.isoformat() for value in micros]
     if pa.types.is_date(kind):
         return ["" if value is None else value.isoformat() for value in values.to_pylist()]
     raise unreadable(_NO_TEXT)

@@ -1,7 +1,8 @@
 """Arrow columns of structs and of lists within lists, as the columns of numbers and of lists that they hold.
 
 `acc` of structs with x, y and z is `acc_x`, `acc_y` and `acc_z`; so are lists of such structs, lists of triples, and
-three lists in one. How long lists within lists are says the first row; another row must have as many.
+three lists in one. How long lists within lists are says the first row; another row must have as many. Lists that all
+have three numbers, or six, are the vectors of samples and no impacts of so few.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ Batches = Callable[[list[int]], Iterator[pa.RecordBatch]]
 MAX_DEPTH = 4
 MAX_WIDTH = 16
 """Components of one sample: six axes, perhaps with their resultants."""
+VECTORS = {3, 6}
+FIRST_ROWS = 8
+"""Rows by which lists are told to be vectors: a table of fewer impacts may have lists of any length."""
 
 Within = Literal["field", "field of each", "part", "part of each"]
 
@@ -47,12 +51,18 @@ class _Leaf:
 def laid_out(schema: pa.Schema, batches: Batches) -> tuple[pa.Schema, Batches]:
     """A schema without structs and lists within lists, and its batches; what holds none of them stays as it is."""
     nested = [place for place, kind in enumerate(schema.types) if _is_nested(kind)]
-    if not nested:
+    widths = _vectors(schema, batches)
+    if not nested and not widths:
         return schema, batches
     first = _first_row(batches, nested)
     leaves: list[_Leaf] = []
     for place, field in enumerate(schema):
-        for leaf in _leaves(_Leaf(field, place), first.get(place)):
+        whole = _Leaf(field, place)
+        width = widths.get(place)
+        parts = (
+            _leaves(whole, first.get(place)) if width is None else _vector(whole, field.type.value_type, width, "part")
+        )
+        for leaf in parts:
             if len(leaves) > MAX_COLUMNS:  # refused with that bound by whoever takes the schema
                 break
             leaves.append(leaf)
@@ -67,7 +77,27 @@ def laid_out(schema: pa.Schema, batches: Batches) -> tuple[pa.Schema, Batches]:
     return pa.schema([leaf.field for leaf in leaves]), taken
 
 
-def _is_list(kind: pa.DataType) -> bool:
+def _vectors(schema: pa.Schema, batches: Batches) -> dict[int, int]:
+    """The widths of lists of numbers that hold a vector a row, by the first rows, if all such lists do."""
+    places = [place for place, kind in enumerate(schema.types) if is_list(kind) and not _is_nested(kind)]
+    if not places:
+        return {}
+    lengths: list[set[int]] = [set() for _ in places]
+    rows = 0
+    for batch in batches(places):
+        rows += batch.num_rows
+        for found, column in zip(lengths, batch.columns, strict=True):
+            found |= set(pc.list_value_length(column).drop_null().to_pylist())
+        if rows >= FIRST_ROWS:
+            break
+    widths = [min(found) for found in lengths if len(found) == 1]
+    if rows < FIRST_ROWS or len(widths) < len(places) or not set(widths) <= VECTORS:
+        return {}
+    return dict(zip(places, widths, strict=True))
+
+
+def is_list(kind: pa.DataType) -> bool:
+    """Whether cells of this type are lists, of whatever."""
     return bool(pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind))
 
 
@@ -75,16 +105,16 @@ def _is_nested(kind: pa.DataType) -> bool:
     """Whether a column of this type is laid out: a vector of one size is, a list of any length holds samples."""
     if pa.types.is_fixed_size_list(kind):
         return True
-    return bool(pa.types.is_struct(kind)) or (_is_list(kind) and _is_nested_within(kind.value_type))
+    return bool(pa.types.is_struct(kind)) or (is_list(kind) and _is_nested_within(kind.value_type))
 
 
 def _is_nested_within(kind: pa.DataType) -> bool:
-    return bool(pa.types.is_struct(kind)) or _is_list(kind)
+    return bool(pa.types.is_struct(kind)) or is_list(kind)
 
 
 def _first_row(batches: Batches, places: list[int]) -> dict[int, Any]:
     """What the columns hold where each has something first, within the first batch."""
-    batch = next((batch for batch in batches(places) if batch.num_rows), None)
+    batch = next((batch for batch in batches(places) if batch.num_rows), None) if places else None
     if batch is None:
         return {}
     told = {place: column.drop_null() for place, column in zip(places, batch.columns, strict=True)}
@@ -108,11 +138,11 @@ def _parts(leaf: _Leaf, first: pa.Scalar | None) -> Iterator[tuple[_Leaf, pa.Sca
             yield _below(leaf, field.name, field, _Step("field", number, kind.num_fields)), _held(first, number)
     elif pa.types.is_fixed_size_list(kind) and not _is_nested_within(kind.value_type):
         yield from ((part, None) for part in _vector(leaf, kind.value_type, kind.list_size, "part"))
-    elif _is_list(kind) and pa.types.is_struct(kind.value_type):
+    elif is_list(kind) and pa.types.is_struct(kind.value_type):
         for number, field in enumerate(kind.value_type):
             step = _Step("field of each", number, kind.value_type.num_fields)
             yield _below(leaf, field.name, _listed(field), step), None
-    elif _is_list(kind) and _is_list(kind.value_type) and _length(first):
+    elif is_list(kind) and is_list(kind.value_type) and _length(first):
         outer, inner = _length(first), _length(_held(first, 0))
         if outer == len(AXES) and inner > MAX_WIDTH:  # three lists of samples
             yield from ((part, None) for part in _vector(leaf, kind.value_type, outer, "part"))
@@ -147,7 +177,7 @@ def _held(value: pa.Scalar | None, number: int) -> pa.Scalar | None:
     """What a struct or a list holds in a place."""
     if value is None or not value.is_valid or len(value) <= number:
         return None
-    return value.values[number] if _is_list(value.type) else value[number]
+    return value.values[number] if is_list(value.type) else value[number]
 
 
 def _within(column: pa.Array, leaf: _Leaf) -> pa.Array:
