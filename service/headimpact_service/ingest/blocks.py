@@ -8,9 +8,17 @@ from itertools import accumulate, groupby, pairwise
 
 import numpy as np
 
-from headimpact_service.ingest.cells import numbers_said, said
+from headimpact_service.ingest.cells import is_written_number, numbers_said, said
+from headimpact_service.ingest.spelling import words_of
 
 _WITH_PARTS = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
+_PHASES = frozenset(
+    {
+        *("pre", "post", "before", "during", "after", "pretrigger", "posttrigger", "trigger", "triggered", "impact"),
+        *("baseline", "rest", "idle", "active", "inactive", "on", "off", "begin", "start", "end", "rise", "decay"),
+    }
+)
+"""Words for the parts of one impact's record."""
 _YES_OR_NO = ({"0", "1"}, {"true", "false"}, {"yes", "no"}, {"y", "n"}, {"t", "f"}, {"t", "n"})
 SHORTEST = 3
 """Samples of an impact."""
@@ -59,6 +67,20 @@ def number_impacts(cells: Sequence[str]) -> bool:
 def tell_parts(cells: Sequence[str]) -> bool:
     """Whether a column parts its rows as impacts are parted, whatever it is called: in blocks, or counting anew."""
     return lie_in_blocks(cells) or lie_in_long_blocks(cells) or _count_up(_blocks(cells)) or _counts_anew(cells)
+
+
+def tell_parts_or_name_them(cells: Sequence[str]) -> bool:
+    """The same, also of words that each name many rows, in all of them or, as merged cells are saved, in the first."""
+    if tell_parts(cells):
+        return True
+    filled = list(accumulate(map(said, cells), _carried))
+    if filled[:1] == [""]:
+        return False
+    named = _lengths(filled, STAY)
+    words = len(named) > 1 and not any(map(is_written_number, named)) and not _are_yes_or_no(named)
+    if words and not any(_PHASES & set(words_of(name)) for name in named):
+        return True
+    return "" in map(said, cells) and tell_parts(filled)
 
 
 def count_triggers(cells: Sequence[str]) -> bool:

@@ -1,4 +1,4 @@
-"""Times of samples that are written as times of day: `2026-10-03T14:05:22.113Z`, `2:05:22.113 PM`.
+"""Times of samples that are written as times of day, or elapsed: `2026-10-03T14:05:22.113Z`, `0 days 00:00:00.113`.
 
 Of a date that does not begin with its year nobody needs to know the day from the month: samples are of one day, or of
 one and the next.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from datetime import timedelta
 
 from headimpact_service.ingest.cells import is_no_number, said
 from headimpact_service.ingest.times import nanoseconds
@@ -15,14 +16,17 @@ from headimpact_service.ingest.times import nanoseconds
 FIRST_ROWS = 8
 """Rows by which a column is told: where one has a whole second and nothing behind it, the next has not."""
 _CLOCK = re.compile(
-    r"(?:(?P<date>[0-9]{1,4}[-./][0-9]{1,2}[-./][0-9]{1,4})[ ,T]+)?"
+    r"(?:(?P<date>[0-9]{1,4}[-./][0-9]{1,2}[-./][0-9]{1,4})[ ,T]+|(?P<days>-?[0-9]{1,4}) days? \+?)?"
     r"(?:(?P<hours>[0-9]{1,2}):)?(?P<minutes>[0-9]{1,2}):(?P<seconds>[0-9]{2})"
     r"(?:[.,](?P<parts>[0-9]{1,9})|:(?P<thousandths>[0-9]{3}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?",
     re.ASCII,
 )
-"""A time of day, with a date or without; without hours, minutes and seconds as a spreadsheet shows them."""
+"""A time of day, with a date or without, or one that has passed, with its days; without hours, minutes and seconds as a
+spreadsheet shows them."""
 _FRACTION = re.compile(r":[0-9]{2}(?:[.,][0-9]|:[0-9]{3})", re.ASCII)
 _DAY_S = 86_400
+_NIGHT_S = 23 * 3600
+"""What a clock without a date falls by at midnight, at least."""
 MAX_DAYS = 4000
 """Of one file: eleven years of them."""
 
@@ -52,7 +56,9 @@ class Elapsed:
     def __init__(self) -> None:
         """Nothing is read yet."""
         self._first: int | None = None
-        self._days: dict[str | None, int] = {}
+        self._days: dict[str, int] = {}
+        self._midnights = 0
+        self._last_s = 0
 
     def microseconds(self, cell: str) -> float:
         """The time in a cell; NaN where there is none, infinite where something else stands."""
@@ -76,15 +82,31 @@ class Elapsed:
             return None
         if len(self._days) > MAX_DAYS:
             return None
-        day = self._days.setdefault(found["date"], len(self._days))
         parts = found["parts"] or found["thousandths"] or ""
-        return (day * _DAY_S + seconds) * 10**9 + int(parts.ljust(9, "0"))
+        return (self._day(found, seconds) * _DAY_S + seconds) * 10**9 + int(parts.ljust(9, "0"))
+
+    def _day(self, found: re.Match[str], seconds: int) -> int:
+        """Which day a time is of: the one that is written or, without any, the one that midnights have led to."""
+        if found["days"] is not None:
+            return int(found["days"])
+        if found["date"] is not None:
+            return self._days.setdefault(found["date"], len(self._days))
+        step, self._last_s = seconds - self._last_s, seconds
+        self._midnights += (step < -_NIGHT_S) - (step > _NIGHT_S)
+        return self._midnights
+
+
+def elapsed_text(time: timedelta) -> str:
+    """A time that has passed, as :class:`Elapsed` reads it."""
+    minutes, seconds = divmod(time.seconds, 60)
+    return f"{time.days} days {minutes // 60:02}:{minutes % 60:02}:{seconds:02}.{time.microseconds:06}"
 
 
 def _seconds(found: re.Match[str]) -> int | None:
     """Whole seconds since midnight, or since the hour where none is written; None where no clock shows that."""
     hours, minutes, seconds = (int(found[name] or 0) for name in ("hours", "minutes", "seconds"))
-    if minutes > 59 or seconds > 59 or hours > 23 or (found["hours"] is None and (found["date"] or found["half"])):
+    whole = found["date"] or found["days"] or found["half"]
+    if minutes > 59 or seconds > 59 or hours > 23 or (found["hours"] is None and whole):
         return None
     if found["half"] is not None:
         if not 1 <= hours <= 12:

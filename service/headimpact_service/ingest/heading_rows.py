@@ -103,18 +103,24 @@ def _first_numbers(lines: Sequence[str]) -> tuple[int, str] | None:
 
 
 def _heading(rows: Sequence[Sequence[str]]) -> int:
-    """The first row of words that is as wide as the numbers below it and mostly filled; else the first of all."""
+    """The first row of words that is as wide as the numbers below it and mostly filled; else the first of all.
+
+    Where axes stand below quantities, each as often as it has axes, the axes' row.
+    """
     width = len(rows[-1])
-    for place, row in enumerate(rows[:-1]):
-        filled = _filled(row)
-        if (
-            len(row) == width
-            and 2 * len(filled) >= width
-            and len(filled) > 1
-            and not any(map(is_written_number, filled))
-        ):
-            return place
-    return 0
+    wide = [place for place, row in enumerate(rows[:-1]) if _may_be_headings(row, width)]
+    if not wide:
+        return 0
+    first = wide[0]
+    if first + 1 in wide and joined(rows[first], rows[first + 1]) != list(rows[first + 1]):
+        return first + 1
+    return first
+
+
+def _may_be_headings(row: Sequence[str], width: int) -> bool:
+    filled = _filled(row)
+    words = not any(map(is_written_number, filled))
+    return len(row) == width and 2 * len(filled) >= width and len(filled) > 1 and words
 
 
 def _filled(cells: Sequence[str]) -> list[str]:

@@ -69,7 +69,13 @@ class Headings:
                     raise layout_problem("Two columns of the file have the same heading.", code="heading-twice")
                 if places:
                     return places[0]
-        return None
+        return next((place for name in spellings if (place := self._numbered(name)) is not None), None)
+
+    def _numbered(self, name: str) -> int | None:
+        """The column that `Column 1` names, if it has no heading."""
+        number = name.strip().lower().removeprefix("column ")
+        place = int(number) - 1 if number.isdecimal() and len(number) < 6 and number != name.strip() else -1
+        return place if 0 <= place < len(self.written) and not self.written[place] else None
 
     def nearest(self, spelling: str, column: int) -> int | None:
         """Of the columns that a spelling names, the nearest before `column`, else the first."""
@@ -160,8 +166,12 @@ class Vocabulary:
             raise ValueError(f"The vocabulary gives the heading {heading} two meanings.")
 
     def understand(self, heading: str) -> Meaning | None:
-        """What a heading says, if it is made of known words; one too long for a mapping says nothing."""
-        return self._meanings.get(compact(heading)) if len(heading) <= MAX_COMPACT else None
+        """What a heading says, if it is made of known words.
+
+        One too long for a mapping says nothing. Neither does `-ay`: whether its numbers are to be turned is unclear.
+        """
+        unclear = len(heading) > MAX_COMPACT or heading.lstrip().startswith("-")
+        return None if unclear else self._meanings.get(compact(heading))
 
     def meanings(self, headings: Headings) -> list[Meaning | None]:
         """What each heading says with the unit beside it or, where that says nothing, as it is written."""

@@ -19,16 +19,19 @@ from headimpact_service.ingest.blocks import (
     mark_blocks,
     number_impacts,
     peaks_lie_in_blocks,
-    tell_parts,
+    tell_parts_or_name_them,
 )
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.filling import MOST
+from headimpact_service.ingest.labelled_rows import labelled_row
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.mapping import read_from_none
 from headimpact_service.ingest.unread import left_out, lie_apart, longest_s, moment_of, span_s
 from headimpact_service.ingest.windows import Rows, numbers_of
 
+MAX_SHOWN = 40
+"""Characters of a cell that a message shows."""
 _OR_ONE = "; if they are one, say so by an empty group_by"
 _SAY = "does not say the same"
 _ANY = "does not say something"
@@ -82,12 +85,15 @@ class RowLabels:
     def _require_unread_alike(self, time_zone: str | None) -> None:
         """The same of columns that are not read otherwise, by what their headings or their cells say they are."""
         unread = self.layout.unread
+        for column in (*unread.names, *unread.counters, *unread.others) if unread.alone else ():
+            if (found := labelled_row(self._cells(column))) is not None:
+                raise self._no_sample(column, *found)
         for columns, tell, what in (
             (unread.names, are_named_apart if unread.alone else are_several, _SAY),
             (unread.impacts, number_impacts, _SAY),
             (unread.times, partial(lie_apart, time_zone=time_zone), _TIME),
             (unread.counters, begins_anew, _COUNT),
-            (unread.others, tell_parts, _SAY),
+            (unread.others, tell_parts_or_name_them, _SAY),
             (unread.marks, mark_blocks, _SAY),
             (unread.triggers, count_triggers, _SAY),
             (unread.peaks, peaks_lie_in_blocks, _SAY),
@@ -96,6 +102,14 @@ class RowLabels:
             for column in columns:
                 if tell(self._cells(column)):
                     raise self._several(column, what, self._or_one())
+
+    def _no_sample(self, column: int, place: int, name: str) -> Problem:
+        row = numbers_of(self.rows)[place] - numbers_of(self.rows)[0] + self.row
+        return file_fault(
+            f"{self.layout.named(column)} calls row {row + 1} below the headings {name[:MAX_SHOWN]}, which seems to be "
+            "no sample: leave such rows out, or say by an empty group_by that all rows are samples of one impact.",
+            "labelled-row",
+        )
 
     def _or_one(self) -> str:
         """What to do if a column that is not read says nothing of impacts."""
@@ -112,8 +126,8 @@ class RowLabels:
         return next((self._by(column) for column in found), "")
 
     def _by(self, column: int) -> str:
-        heading = self.layout.headings[column]
-        return f' (["{heading}"], if that tells them apart)' if heading else ""
+        heading = self.layout.headings[column] or f"Column {column + 1}"
+        return f' (["{heading}"], if that tells them apart)'
 
     def _or_unread(self, column: int) -> str:
         """How to leave a column alone that says nothing of the impact: a number of each row, say."""

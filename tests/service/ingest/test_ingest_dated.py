@@ -15,7 +15,7 @@ from ingest_files import codes, one, read, refused, six_axis
 
 from headimpact.errors import TraceError
 from headimpact.preparation import prepare
-from headimpact_service.ingest.dated import MAX_DAYS, Elapsed
+from headimpact_service.ingest.dated import MAX_DAYS, Elapsed, elapsed_text
 from headimpact_service.ingest.guarded.xlsx_file import SheetTable, _Block
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
@@ -114,7 +114,26 @@ def test_thousandths_may_stand_behind_a_colon():
 def test_an_impact_may_go_on_behind_midnight_where_days_are_written():
     first = dt.datetime(2026, 11, 20, 23, 59, 59, 990_000, dt.UTC)
     assert rate_of(one(csv(columns(clock("%d.%m.%Y %H:%M:%S.%f", first=first))))) == 2000.0
-    assert codes(refused(csv(columns(clock("%H:%M:%S.%f", first=first))))) == [(None, "several-impacts")]
+
+
+@every_table
+def test_a_clock_without_a_date_goes_on_behind_midnight(write: Writer):
+    first = dt.datetime(2026, 11, 20, 23, 59, 59, 990_000, dt.UTC)
+    assert rate_of(one(write(columns(clock("%H:%M:%S.%f", first=first))))) == 2000.0
+
+
+@pytest.mark.parametrize("step_h", [-3, -20, -22])
+def test_a_clock_that_falls_by_less_than_a_day_begins_anew(step_h: int):
+    times = clock("%H:%M:%S.%f", first=dt.datetime(2026, 11, 20, 23, 10, tzinfo=dt.UTC))
+    times[SAMPLES // 2 :] = [f"{23 + step_h:02}{text[2:]}" for text in times[SAMPLES // 2 :]]
+    assert codes(refused(csv(columns(times)))) == [(None, "several-impacts")]
+
+
+@every_table
+@pytest.mark.parametrize("begins", [0.0, -0.01, 86_400.0 - 0.01, 3 * 86_400.0])
+def test_times_that_have_passed_are_read_with_their_days(write: Writer, begins: float):
+    passed = [dt.timedelta(seconds=begins + n / 2000) for n in range(SAMPLES)]
+    assert rate_of(one(write(columns([elapsed_text(time) for time in passed])))) == 2000.0
 
 
 def test_a_file_has_so_many_days_at_most():

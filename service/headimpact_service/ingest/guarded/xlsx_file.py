@@ -18,7 +18,7 @@ import numpy as np
 from python_calamine import CalamineSheet, CalamineWorkbook, SheetTypeEnum
 
 from headimpact_service.ingest.cells import is_no_number, number_text, said
-from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
+from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns, elapsed_text
 from headimpact_service.ingest.decimal_commas import MIXED, UNCLEAR_COMMA, has_comma, has_decimal_comma
 from headimpact_service.ingest.guarded.contents import (
     Content,
@@ -88,12 +88,23 @@ def warm_up() -> None:
 
 @dataclass(slots=True)
 class _Block:
-    """Headings and the rows below them; `columns` are those that have a heading."""
+    """Headings and the rows below them; of the `columns` some may have no heading."""
 
     columns: list[int]
     headings: list[str]
     units: list[str]
     rows: list[Row] = field(default_factory=list)
+    joined: bool = False
+    """Whether the headings stood again among the rows."""
+
+    @property
+    def named(self) -> list[int]:
+        """The columns that have a heading."""
+        return [column for column, heading in zip(self.columns, self.headings, strict=True) if heading]
+
+    def goes_on(self, other: _Block) -> bool:
+        """Whether another block has the same headings in the same columns."""
+        return (self.columns, self.headings) == (other.columns, other.headings)
 
     def cells(self, place: int, first: int | None = None) -> list[Any]:
         """One column or its first cells, empty where a row is too short for it."""
@@ -114,6 +125,7 @@ class SheetTable:
         self.units = dict(enumerate(checked_headings(unit for block in blocks for unit in block.units)))
         self._places = [(block, place) for block in blocks for place in range(len(block.columns))]
         self._rows = max(len(block.rows) for block in blocks)
+        self._joined = any(block.joined for block in blocks)
         self.dated = dated_columns(list(map(_time, block.cells(place, FIRST_ROWS))) for block, place in self._places)
         self._elapsed = Elapsed()
 
@@ -132,6 +144,7 @@ class SheetTable:
                 rows=min(ROWS_AT_ONCE, self._rows - first),
                 numbers={place: values[rows] for place, values in columns.items()},
                 texts={place: cells[rows] for place, cells in words.items()},
+                joined=self._joined,
             )
 
     def _require_one_point(self, numbers: Sequence[int]) -> None:
@@ -172,27 +185,37 @@ def _blocks(sheet: CalamineSheet) -> tuple[list[_Block], list[list[str]]]:
             empty.append(row)
             continue
         if _has_number(row):
-            block = _begun(*above)
-            if block is not None and sum(_says_number(row[column]) for column in block.columns) > 1:
-                blocks.append(block)
+            block = _begun(*above, row)
+            if block is not None and sum(_says_number(row[column]) for column in block.named) > 1:
+                if blocks and blocks[-1].goes_on(block):
+                    blocks[-1].joined = True
+                else:
+                    blocks.append(block)
                 empty = []
             if blocks:
                 blocks[-1].rows += [*empty, row]
                 empty = []
         if not blocks and len(first) < LOOK:
             first.append(stated(map(_stated, row)))
-        above = [*above[1:], row]
+        if blocks or not _holds_nothing(row):
+            above = [*above[1:], row]
     return blocks, first
 
 
-def _begun(top: Row, above: Row, before: Row) -> _Block | None:
-    """The block whose headings are the row before its numbers, or the one above that where it is a row of units."""
+def _begun(top: Row, above: Row, before: Row, numbers: Row) -> _Block | None:
+    """The block whose headings are the row before its numbers, or the one above that where it is a row of units.
+
+    A column without a heading belongs to it if something stands in its first row: what tells impacts apart, perhaps.
+    """
     has_units = bool(_named_columns(above)) and are_units(list(map(_word, above)), list(map(_word, before)))
     upper, named, units = (top, above, before) if has_units else (above, before, [])
     if len(_named_columns(named)) < 2:
         return None
     headings = joined([] if _has_number(upper) else list(map(_word, upper)), list(map(_word, named)))
-    columns = _named_columns(headings)
+    named_columns = _named_columns(headings)
+    filled = (column for column, cell in enumerate(numbers) if cell is not None and cell != "")
+    columns = sorted({*named_columns, *filled})
+    headings += [""] * (columns[-1] + 1 - len(headings))
     said = [_word(units[column]) if column < len(units) else "" for column in columns]
     return _Block(columns, [headings[column].strip() for column in columns], said)
 
@@ -209,6 +232,8 @@ def _time(cell: Any) -> str:  # noqa: ANN401 - any cell
     """A cell that may be a time, as text; a date that has none is midnight's, as a workbook keeps it."""
     if isinstance(cell, dt.date) and not isinstance(cell, dt.datetime):
         return f"{cell.isoformat()}T00:00:00"
+    if isinstance(cell, dt.timedelta):
+        return elapsed_text(cell)
     return cell.isoformat() if isinstance(cell, dt.datetime | dt.time) else _word(cell)
 
 
@@ -248,6 +273,8 @@ def _number(cell: Any) -> float:  # noqa: ANN401 - any cell
 def _text(cell: Any) -> str:  # noqa: ANN401 - any cell
     if isinstance(cell, dt.date | dt.time):
         return cell.isoformat()
+    if isinstance(cell, dt.timedelta):
+        return elapsed_text(cell)
     if isinstance(cell, float):
         return number_text(cell)
     return checked_text(str(cell))
