@@ -9,7 +9,7 @@ from math import inf
 
 import numpy as np
 
-from headimpact.cut_offs import AppliedFilter, CutOff, corner_frequency
+from headimpact.cut_offs import PAPER, AppliedFilter, CutOff, LowPass, corner_frequency
 from headimpact.errors import TraceError
 from headimpact.published import FILTERS
 from headimpact.quality import AXES, Channel, QualityNote, check_rate, words
@@ -46,10 +46,14 @@ class SignalPlan:
 
 @dataclass(frozen=True)
 class Frame:
-    """How one signal comes to head axes: rotation, and which components a plane of motion removes."""
+    """How one signal comes to head axes: rotation, and which components a plane of motion removes.
+
+    `may_rest`: the channels as sent that show nothing of a motion in that plane; of a turned sensor that may be any.
+    """
 
     rotation: FloatArray | None
     removed: tuple[int, ...]
+    may_rest: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,8 @@ class Plan:
     comparison: TimeBase | None
     offset_m: FloatArray | None
     start_time_ms: float
+    units_plan: Plan | None
+    """Where a signal is not filtered, how its motion is filtered to be looked at for a wrong unit."""
 
 
 @lru_cache(maxsize=512)
@@ -113,7 +119,21 @@ def plan_of(layout: Layout) -> Plan:
         comparison=comparison,
         offset_m=_offset(layout, tracks),
         start_time_ms=(base.start_s - layout.clock_start_s) * 1000.0 - (layout.pre_trigger_ms or 0.0),
+        units_plan=_units_plan(layout, tracks),
     )
+
+
+def _units_plan(layout: Layout, tracks: dict[SignalName, Track]) -> Plan | None:
+    """The plan with the paper's filter for each signal that has none; None where all have one, or nothing compares."""
+    chosen, recorded = layout.low_pass, {signal.name for signal in layout.signals}
+    filtered = LowPass(
+        PAPER.linear_acceleration if chosen.linear_acceleration is None else chosen.linear_acceleration,
+        PAPER.angular_velocity if chosen.angular_velocity is None else chosen.angular_velocity,
+    )
+    bare = chosen.linear_acceleration is None or (chosen.angular_velocity is None and "angular_velocity" in recorded)
+    if not bare or not {"linear_acceleration", "angular_acceleration"} <= set(tracks):
+        return None
+    return plan_of(replace(layout, low_pass=filtered))
 
 
 def _trigger_notes(layout: Layout) -> Iterator[QualityNote]:
@@ -219,7 +239,8 @@ def _frame(name: SignalName, layout: Layout) -> Frame:
     if layout.constrained_plane is None:
         return Frame(rotation, ())
     kept = PLANES[layout.constrained_plane][0 if linear else 1]
-    return Frame(rotation, tuple(axis for axis in range(3) if axis not in kept))
+    removed = tuple(axis for axis in range(3) if axis not in kept)
+    return Frame(rotation, removed, removed if rotation is None else (0, 1, 2))
 
 
 def _offset(layout: Layout, tracks: dict[SignalName, Track]) -> FloatArray | None:

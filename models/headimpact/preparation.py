@@ -28,6 +28,7 @@ from headimpact.kinematics import (
 )
 from headimpact.plan import Group, Plan, channels_of, plan_of
 from headimpact.quality import (
+    AXES,
     QualityNote,
     check_angular_acceleration,
     check_channels,
@@ -66,6 +67,8 @@ class Preparation:
     angular_acceleration_source: str | None
     pre_trigger_known: bool
     place: int = 0
+    filtered_peaks: tuple[float, float] | None = None
+    """Peaks of linear [g] and angular acceleration [rad/s^2] after the paper's filters, where a signal has none."""
 
     @classmethod
     def of(cls, kinematics: HeadKinematics, *, pre_trigger_known: bool = False) -> Preparation:
@@ -136,6 +139,7 @@ def _prepared(plan: Plan, block: Sequence[Uniform]) -> list[Preparation | TraceE
     faults = _computed_out_of_range(plan, motion)
     if faults:
         return _without(plan, block, faults)
+    filtered = _filtered_peaks(plan, samples)
     return [
         Preparation(
             motion,
@@ -145,9 +149,22 @@ def _prepared(plan: Plan, block: Sequence[Uniform]) -> list[Preparation | TraceE
             plan.angular_acceleration_source,
             plan.layout.pre_trigger_ms is not None,
             place,
+            None if filtered is None else filtered[place],
         )
         for place, sent in enumerate(block)
     ]
+
+
+def _filtered_peaks(plan: Plan, samples: Sequence[FloatArray]) -> list[tuple[float, float]] | None:
+    """The peaks that tell a wrong unit, of signals that are not filtered themselves; None where they are, or lack one.
+
+    The bounds are those of filtered motion: the derivative of a gyroscope's noise alone goes beyond them.
+    """
+    if plan.units_plan is None:
+        return None
+    motion = _motion(plan.units_plan, samples, [[] for _ in range(samples[0].shape[0])])
+    of_signal = dict(zip(motion.signals, motion.peaks.tolist(), strict=True))
+    return list(zip(of_signal["linear_acceleration"], of_signal["angular_acceleration"], strict=True))
 
 
 def _without(plan: Plan, block: Sequence[Uniform], faults: dict[int, TraceError]) -> list[Preparation | TraceError]:
@@ -188,9 +205,9 @@ def _looked_at(plan: Plan, samples: Sequence[FloatArray], place: int) -> Iterato
         for row, number in enumerate(group.members)
     }
     require_samples([(signal.name, values[signal.name]) for signal in signals])
-    planar = plan.layout.constrained_plane is not None
+    may_rest = {(name, AXES[axis]) for name, frame in plan.frames.items() for axis in frame.may_rest}
     for group, found in zip(plan.groups, samples, strict=True):
-        yield from check_channels(channels_of([signals[i] for i in group.members]), found[place].T, planar=planar)
+        yield from check_channels(channels_of([signals[i] for i in group.members]), found[place].T, may_rest)
     for name in ("angular_velocity", "angular_acceleration"):
         if "linear_acceleration" in values and name in values:
             yield from check_identical(("linear_acceleration", values["linear_acceleration"]), (name, values[name]))
@@ -206,9 +223,10 @@ def _motion(plan: Plan, samples: Sequence[FloatArray], noted: list[list[QualityN
         for row, (name, track) in enumerate(plan.tracks.items())
     }
     _fill(plan, samples, tracks)
-    _derive(plan, tracks, noted)
+    _derive(plan, tracks)
     for name, values in tracks.items():
         _to_head_axes(plan, name, values, noted)
+    _compare_rotation(plan, tracks, noted)
     if not in_place:
         _look_outside(plan, tracks, noted)
         for row, name in enumerate(signals):
@@ -230,7 +248,7 @@ def _fill(plan: Plan, samples: Sequence[FloatArray], tracks: Tracks) -> None:
             tracks[signal.name][...] = values.transpose(2, 1, 0)
 
 
-def _derive(plan: Plan, tracks: Tracks, noted: list[list[QualityNote]]) -> None:
+def _derive(plan: Plan, tracks: Tracks) -> None:
     """What one rotation signal says of the other: velocity by its integral, acceleration by its derivative."""
     if plan.angular_velocity_source is None:
         return
@@ -238,12 +256,17 @@ def _derive(plan: Plan, tracks: Tracks, noted: list[list[QualityNote]]) -> None:
     if plan.angular_velocity_source == "integral":
         w[...] = running_integral(alpha, plan.tracks["angular_acceleration"].rate_hz)
         return
-    rate = plan.tracks["angular_velocity"].rate_hz
+    if plan.angular_acceleration_source == "five_point_stencil":
+        differentiate(w, plan.tracks["angular_velocity"].rate_hz, out=alpha)
+
+
+def _compare_rotation(plan: Plan, tracks: Tracks, noted: list[list[QualityNote]]) -> None:
+    """Hold a supplied angular acceleration, as it is scored, against the derivative of the angular velocity."""
     if plan.comparison is None:
-        differentiate(w, rate, out=alpha)
         return
-    derived = brought(differentiate(w, rate), plan.comparison.ways["angular_velocity"])
-    supplied = brought(alpha, plan.comparison.ways["angular_acceleration"])
+    ways, w = plan.comparison.ways, tracks["angular_velocity"]
+    derived = brought(differentiate(w, plan.tracks["angular_velocity"].rate_hz), ways["angular_velocity"])
+    supplied = brought(tracks["angular_acceleration"], ways["angular_acceleration"])
     for place, notes in enumerate(noted):
         notes += check_angular_acceleration(supplied[..., place], derived[..., place])
 
@@ -272,11 +295,11 @@ def _to_head_axes(plan: Plan, name: SignalName, values: FloatArray, noted: list[
 def _look_outside(plan: Plan, tracks: Tracks, noted: list[list[QualityNote]]) -> None:
     """Note the signals as sent whose largest sample is in none that are kept."""
     for signal in plan.layout.signals:
-        kept = kept_of(plan.base.ways[signal.name])
-        size = squared_norm(tracks[signal.name])
+        way, size = plan.base.ways[signal.name], squared_norm(tracks[signal.name])
+        kept = kept_of(way)
         if kept.start == 0 and kept.stop >= size.shape[0]:
             continue
-        within = np.sqrt(size[kept].max(axis=0))
+        within = np.sqrt(squared_norm(brought(tracks[signal.name], way)).max(axis=0))
         beyond = np.sqrt(np.delete(size, kept, axis=0).max(axis=0))
         for place, notes in enumerate(noted):
             notes += check_cut_off(signal.name, float(within[place]), float(beyond[place]))

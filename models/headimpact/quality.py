@@ -7,7 +7,7 @@ kinematics of the head's centre of gravity.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -92,7 +92,9 @@ def beyond_full_scale(declared_range: float) -> float:
     return float(QUALITY_LIMITS["saturation"]["beyond_range"] * declared_range)
 
 
-def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: bool) -> Iterator[QualityNote]:
+def check_channels(
+    channels: Sequence[Channel], samples: FloatArray, may_rest: Collection[tuple[str, str]] = ()
+) -> Iterator[QualityNote]:
     """Notes on single channels as sent.
 
     Parameters
@@ -101,15 +103,14 @@ def check_channels(channels: Sequence[Channel], samples: FloatArray, *, planar: 
         What each column is.
     samples
         n x channels, in the criteria's units.
-    planar
-        Whether the motion was constrained to a plane: channels that stay zero are then no finding.
+    may_rest
+        Signals and axes of channels outside the plane that the motion was constrained to: that they stay is no finding.
     """
     magnitude = np.abs(samples)
     peaks: FloatArray = magnitude.max(axis=0)
     yield from _extreme_values(channels, peaks)
     yield from _beyond_range(channels, peaks)
-    if not planar:
-        yield from _constant_channels(channels, samples)
+    yield from _constant_channels(channels, samples, may_rest)
     yield from _saturated(channels, magnitude, peaks)
     yield from _edge_glitches(channels, samples, peaks)
 
@@ -137,12 +138,16 @@ def _beyond_range(channels: Sequence[Channel], peaks: FloatArray) -> Iterator[Qu
             )
 
 
-def _constant_channels(channels: Sequence[Channel], samples: FloatArray) -> Iterator[QualityNote]:
+def _constant_channels(
+    channels: Sequence[Channel], samples: FloatArray, may_rest: Collection[tuple[str, str]]
+) -> Iterator[QualityNote]:
     constant = (samples == samples[0]).all(axis=0)
     if not constant.any():
         return
     for column in np.flatnonzero(constant).tolist():
         channel = channels[column]
+        if (channel.signal, channel.axis) in may_rest:
+            continue
         level = "zero" if samples[0, column] == 0 else "one value"
         yield _warning(
             "constant_channel",

@@ -36,6 +36,9 @@ CONVENTIONS: Mapping[str, str] = {
 
 Components = tuple[float, float, float]
 
+AT_REST_RAD = 1e-12
+"""Up to here a brain angle is the rounding of a filter: that of a gyroscope's offset is at 1e-15."""
+
 NORMAL_975 = 1.959963984540054
 """The 97.5th percentile of the standard normal distribution."""
 
@@ -224,7 +227,7 @@ class _Table:
     def _notes(self, row: int, preparation: Preparation) -> Iterable[QualityNote]:
         a, alpha = self._peaks.get("linear_acceleration"), self._peaks.get("angular_acceleration")
         if a is not None and alpha is not None:
-            yield from check_units(a[row], alpha[row])
+            yield from check_units(*(preparation.filtered_peaks or (a[row], alpha[row])))
         yield from check_truncation(
             self._motion,
             None if a is None or a[row] == 0 else self._acceleration_peaks[row],
@@ -281,10 +284,14 @@ def _intervals(values: FloatArray, predictors: FloatArray, model: RiskModel) -> 
 
 
 def _angle_rows(evaluation: Evaluation) -> tuple[list[float], list[list[int]] | None]:
-    """Peak resultant brain angle of each impact, and the sample at which each axis peaks; without rotation, none."""
+    """Peak resultant brain angle of each impact, and the sample at which each axis peaks; without rotation, none.
+
+    An axis that does not turn peaks at the first sample.
+    """
     if evaluation.brain_angle is None or evaluation.brain_angle_resultant is None:
         return [], None
     samples = np.abs(evaluation.brain_angle).argmax(axis=0)
+    samples[evaluation.values["bam"] <= AT_REST_RAD] = 0
     return evaluation.brain_angle_resultant.tolist(), samples.T.tolist()
 
 

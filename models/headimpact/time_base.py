@@ -13,6 +13,9 @@ from headimpact.errors import TraceError
 from headimpact.published import QUALITY_LIMITS
 from headimpact.recording import FloatArray, SignalName
 
+SLACK = 1e-3
+"""Of a step: equal records do not lose a sample to rounding."""
+
 
 @dataclass(frozen=True, slots=True)
 class Track:
@@ -60,9 +63,8 @@ def common_time_base(tracks: Mapping[SignalName, Track]) -> TimeBase:
     base = _fastest(tracks)
     start = max(track.start_s for track in tracks.values())
     stop = min(track.start_s + (track.samples - 1) / track.rate_hz for track in tracks.values())
-    # a thousandth of a step of slack, so that equal records do not lose a sample to rounding
-    first = max(0, ceil((start - base.start_s) * base.rate_hz - 1e-3))
-    last = min(base.samples - 1, floor((stop - base.start_s) * base.rate_hz + 1e-3))
+    first = max(0, ceil((start - base.start_s) * base.rate_hz - SLACK))
+    last = min(base.samples - 1, floor((stop - base.start_s) * base.rate_hz + SLACK))
     if last - first + 1 < QUALITY_LIMITS["record"]["minimum_samples"]:
         raise TraceError("no-overlap", "The signals must overlap in time by at least 3 samples.")
     ways = {name: _way(track, base, first, last) for name, track in tracks.items()}
@@ -94,8 +96,12 @@ def _way(track: Track, base: Track, first: int, last: int) -> slice | Onto:
 
 
 def kept_of(way: slice | Onto) -> slice:
-    """Which samples of a signal those of the base come from."""
-    return way if isinstance(way, slice) else slice(int(way.before[0]), int(way.before[-1]) + 2)
+    """Which samples of a signal lie within the time of the base's."""
+    if isinstance(way, slice):
+        return way
+    first = int(way.before[0]) + int(way.share[0] > SLACK)
+    last = int(way.before[-1]) + int(way.share[-1] >= 1.0 - SLACK)
+    return slice(first, last + 1)
 
 
 def brought(values: FloatArray, way: slice | Onto) -> FloatArray:

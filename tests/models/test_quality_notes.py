@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from waveforms import burst, recording
 
-from headimpact.cut_offs import NO_FILTER
+from headimpact.cut_offs import NO_FILTER, PAPER
 from headimpact.errors import TraceError
 from headimpact.kinematics import HeadKinematics, differentiate
 from headimpact.preparation import Preparation, prepare
@@ -329,3 +329,77 @@ def test_stamps_that_go_through_zero_at_another_time_than_the_trigger_are_noted(
     found = notes(given, "time_origin_mismatch")
     assert [note.severity for note in found] == ["note"] * noted
     assert all("begin 10 ms before zero" in note.detail for note in found)
+
+
+def noisy(noise_rad_s: float, scale: float = 1.0, **filters: object) -> Recording:
+    """At 20 kHz, where a gyroscope's noise alone gives a large derivative."""
+    clean = recording(samples=2000, rate_hz=20_000.0)
+    w = clean.angular_velocity.values + np.random.default_rng(3).normal(scale=noise_rad_s, size=(2000, 3))
+    a = Signal(clean.linear_acceleration.values * scale, "g", 2e4)
+    return replace(clean, linear_acceleration=a, angular_velocity=Signal(w, "rad/s", 2e4), **filters)
+
+
+@pytest.mark.parametrize(("noise_rad_s", "scale", "noted"), [(0.4, 0.5, False), (0.2, 4.5, True)])
+def test_the_unit_check_is_of_filtered_motion_also_where_none_is_scored(noise_rad_s, scale, noted):
+    found = [
+        notes(noisy(noise_rad_s, scale, **filters), "implausible_units")
+        for filters in ({}, {"low_pass": NO_FILTER}, {"low_pass": replace(PAPER, angular_velocity=None)})
+    ]
+    assert found[0] == found[1] == found[2]
+    assert bool(found[0]) == noted
+    bare = score(prepare(noisy(noise_rad_s, scale, low_pass=NO_FILTER))).peaks
+    ratio = bare.angular_acceleration_rad_s2 * 0.07 / (bare.linear_acceleration_g * 9.81)
+    assert (0.12 <= ratio <= 2.0) == noted  # by itself it would say the opposite
+
+
+@pytest.mark.parametrize("offset", [0.3, 35.0])
+def test_the_rounding_of_a_gyroscope_s_offset_is_no_late_peak(offset):
+    w = burst(GENERATOR, 1500, 8.0, 10_000.0)
+    w[:, 0] = offset
+    scored = score(prepare(recording(samples=1500, rate_hz=1e4, angular_velocity=Signal(w, "rad/s", 1e4))))
+    assert {note.code for note in scored.quality} == {"constant_channel"}
+    assert scored.brain_angle.time_of_peak_ms[0] == 0.0
+
+
+@pytest.mark.parametrize("peak", range(25, 40))
+def test_a_peak_counts_as_cut_off_by_what_is_scored(peak):
+    # w at 500 Hz goes on when a at 5000 Hz has ended, between two of its samples
+    w = np.zeros((60, 3))
+    w[10] = w[peak - 1] = w[peak + 1] = 9.0
+    w[peak] = 37.0
+    a = np.zeros((306, 3))
+    a[100] = 20.0
+    given = Recording(Signal(a, "g", 5000.0), Signal(w, "rad/s", 500.0), low_pass=NO_FILTER)
+    scored = score(prepare(given))
+    found = [note.detail for note in scored.quality if note.code == "peak_cut_off"]
+    assert len(found) == (scored.peaks.angular_velocity_rad_s < 64.0)
+    if found:
+        assert f"{scored.peaks.angular_velocity_rad_s:.4g};" in found[0]
+
+
+class TestInAPlane:
+    """The notes are of what is scored."""
+
+    @staticmethod
+    def planar(**changes: object) -> Recording:
+        return replace(recording(), constrained_plane="axial", low_pass=NO_FILTER, **changes)
+
+    def test_a_channel_within_the_plane_that_rests_is_named(self):
+        a, w = A.copy(), W.copy()
+        a[:, 1] = a[:, 2] = w[:, 2] = w[:, 0] = 0.0
+        found = notes(
+            self.planar(linear_acceleration=Signal(a, "g", 1e3), angular_velocity=Signal(w, "rad/s", 1e3)),
+            "constant_channel",
+        )
+        assert [(note.signal, note.channel) for note in found] == [
+            ("linear_acceleration", "y"),
+            ("angular_velocity", "z"),
+        ]
+
+    @pytest.mark.parametrize(("within", "outside", "noted"), [(1.0, -1.0, False), (-1.0, 1.0, True)])
+    def test_rotation_is_compared_within_the_plane(self, within, outside, noted):
+        alpha = differentiate(W, 1000.0) * (outside, outside, within)
+        given = self.planar(
+            angular_velocity=Signal(W, "rad/s", 1e3), angular_acceleration=Signal(alpha, "rad/s^2", 1e3)
+        )
+        assert bool(notes(given, "angular_acceleration_mismatch")) == noted

@@ -16,7 +16,7 @@ from headimpact.criteria import CRITERION_KEYS
 from headimpact.eligibility import DUPLICATE, contradiction, exclusion_reason, first_of_each, outcome_of
 from headimpact.errors import CalibrationError
 from headimpact_service.cli.strain_table import COLUMNS as STRAINS
-from headimpact_service.cli.strain_table import strain_document
+from headimpact_service.cli.strain_table import RESULTANT, strain_document
 from headimpact_service.cli.table_cells import RowError, TableError, read_cells
 from headimpact_service.ingest.formula_cells import unguarded
 from headimpact_service.store.tables import CRITERION_COLUMNS
@@ -119,7 +119,7 @@ def _cohort_table(columns: Mapping[str, Sequence[Any]], include: frozenset[str])
         told = ", ".join(f"{count} {reason}" for reason, count in sorted(excluded.items()))
         raise CalibrationError("no-impacts", f"No row of the table enters the cohort ({told or 'it has no rows'}).")
     known = np.array([outcome[row] for row in entering], dtype=np.float64)
-    read = {name for names in keys.values() for name in names} | {*REQUIRED, *READ_TOO, *STRAINS}
+    read = {name for names in keys.values() for name in names} | {*REQUIRED, *READ_TOO, *STRAINS, RESULTANT}
     return CohortTable(
         make_cohort(known, athletes, criteria, identities=_identities(columns, entering)),
         tuple(entering),
@@ -135,7 +135,8 @@ def _strain(columns: Mapping[str, Sequence[Any]], keys: Mapping[str, Sequence[st
     rows = range(len(columns["outcome"]))
     strains = {name: _numbers(columns, name, rows) for name in STRAINS if name in columns}
     bam = np.stack([_numbers(columns, name, rows) for name in keys["bam"]], axis=1) if "bam" in keys else None
-    return strain_document(strains, bam)
+    resultant = _numbers(columns, RESULTANT, rows)[:, None] if strains and RESULTANT in columns else None
+    return strain_document(strains, bam, resultant)
 
 
 def _criteria(columns: Mapping[str, Any]) -> dict[str, list[str]]:

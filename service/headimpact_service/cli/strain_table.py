@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,15 @@ BY_AXIS = ("corpus_callosum_strain",)
 COLUMNS = (*BY_RESULTANT, *BY_AXIS)
 """What finite-element results are called in a table."""
 SAGITTAL = "y"
+RESULTANT = "brain_angle_resultant"
+"""What the export of impacts calls the largest resultant of the brain angle: not the norm of the axes' own maxima."""
 
 FloatArray = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def strain_document(strains: Mapping[str, FloatArray], bam: FloatArray | None) -> dict[str, Any] | None:
+def strain_document(
+    strains: Mapping[str, FloatArray], bam: FloatArray | None, resultant: FloatArray | None
+) -> dict[str, Any] | None:
     """The regressions of the strains that a table has; None where it has none.
 
     Parameters
@@ -27,27 +31,30 @@ def strain_document(strains: Mapping[str, FloatArray], bam: FloatArray | None) -
     strains
         By column, a value for each impact or NaN; n.
     bam
-        Peak brain angles by axis [rad], n x 3; None where the table lacks them. Their resultant stands for the peak of
-        the resultant, which no table of criteria has.
+        Peak brain angles by axis [rad], n x 3; None where the table lacks them.
+    resultant
+        Peak of the resultant brain angle [rad], n x 1; None where the table lacks it.
     """
     if not strains:
         return None
-    if bam is None:
-        return {name: {"reason": "The table has no brain angles: bam_x, bam_y, bam_z."} for name in strains}
-    return {name: _regressed(name, strain, bam) for name, strain in strains.items()}
+    return {
+        name: _regressed(strain, resultant, ["resultant"], RESULTANT)
+        if name in BY_RESULTANT
+        else _regressed(strain, bam, ["x", "y", "z"], "bam_x, bam_y, bam_z", droppable=[SAGITTAL])
+        for name, strain in strains.items()
+    }
 
 
-def _regressed(name: str, strain: FloatArray, bam: FloatArray) -> dict[str, Any]:
-    known = np.isfinite(strain) & np.isfinite(bam).all(axis=1)
-    x = bam[known]
+def _regressed(
+    strain: FloatArray, angles: FloatArray | None, names: Sequence[str], columns: str, droppable: Sequence[str] = ()
+) -> dict[str, Any]:
+    if angles is None:
+        return {"reason": f"The table has no brain angles of this kind: {columns}."}
+    known = np.isfinite(strain) & np.isfinite(angles).all(axis=1)
     try:
-        if name in BY_RESULTANT:
-            found = regress_strain(strain[known], np.linalg.norm(x, axis=1, keepdims=True), ["resultant"])
-        else:
-            found = regress_strain(strain[known], x, ["x", "y", "z"], droppable=[SAGITTAL])
+        return _document(regress_strain(strain[known], angles[known], names, droppable=droppable))
     except CalibrationError as error:
         return {"reason": str(error)}
-    return _document(found)
 
 
 def _document(found: StrainRegression) -> dict[str, Any]:

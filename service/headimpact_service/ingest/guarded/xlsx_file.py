@@ -185,7 +185,7 @@ def _blocks(sheet: CalamineSheet) -> tuple[list[_Block], list[list[str]]]:
             empty.append(row)
             continue
         if _has_number(row):
-            block = _begun(*above, row)
+            block = _begun(above, row)
             if block is not None and sum(_says_number(row[column]) for column in block.named) > 1:
                 if blocks and blocks[-1].goes_on(block):
                     blocks[-1].joined = True
@@ -202,11 +202,12 @@ def _blocks(sheet: CalamineSheet) -> tuple[list[_Block], list[list[str]]]:
     return blocks, first
 
 
-def _begun(top: Row, above: Row, before: Row, numbers: Row) -> _Block | None:
+def _begun(rows: Sequence[Row], numbers: Row) -> _Block | None:
     """The block whose headings are the row before its numbers, or the one above that where it is a row of units.
 
     A column without a heading belongs to it if something stands in its first row: what tells impacts apart, perhaps.
     """
+    top, above, before = rows
     has_units = bool(_named_columns(above)) and are_units(list(map(_word, above)), list(map(_word, before)))
     upper, named, units = (top, above, before) if has_units else (above, before, [])
     if len(_named_columns(named)) < 2:
