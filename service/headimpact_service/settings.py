@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -9,12 +10,13 @@ from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 MEBIBYTE = 1024 * 1024
+PREFIX = "HEADIMPACT_"
 
 
 class Settings(BaseSettings):
     """The configuration of one process, read once at its start."""
 
-    model_config = SettingsConfigDict(env_prefix="HEADIMPACT_", frozen=True, extra="ignore")
+    model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="ignore")
 
     database_url: str = Field(default="sqlite:///headimpact.db", description="SQLAlchemy URL of the database.")
     host: str = Field(default="127.0.0.1", min_length=1, description="Address to listen on.")
@@ -35,3 +37,10 @@ class Settings(BaseSettings):
         default="info", description="Least severe line logged."
     )
     access_log: bool = Field(default=False, description="One structured line for each request.")
+
+
+def unknown_variables() -> list[str]:
+    """What an operator should know of variables that look like ours and are none: they change nothing."""
+    known = {f"{PREFIX}{name.upper()}" for name in Settings.model_fields}
+    found = sorted(name for name in os.environ if name.upper().startswith(PREFIX) and name.upper() not in known)
+    return [f"{name} is set, and is no setting of this service: it changes nothing." for name in found]

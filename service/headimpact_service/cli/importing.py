@@ -89,7 +89,7 @@ def _progress(console: Console) -> Progress:
 
 def _target(database: Database, organisation: str, mode: str) -> Target:
     def find(conn: Any) -> Target:  # noqa: ANN401 - a connection of the store
-        found = organisations.ensure(conn, organisation)
+        found = organisations.known(conn, organisation)
         settings = organisation_settings.get(conn, found.id)
         data_set = organisations.ensure_data_set(conn, found.id, cast("Literal['live', 'test']", mode))
         terms = terms_of(settings.incidence, settings.operating_points, active_model(conn, data_set))

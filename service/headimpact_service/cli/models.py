@@ -65,7 +65,7 @@ def promote(version: str, *, reason: str, organisation: str, mode: str, database
 
 def _data_set(database: Database, organisation: str, mode: str) -> bytes:
     def find(conn: Any) -> bytes:  # noqa: ANN401 - a connection of the store
-        found = organisations.ensure(conn, organisation)
+        found = organisations.known(conn, organisation)
         return organisations.ensure_data_set(conn, found.id, cast("Literal['live', 'test']", mode))
 
     return database.write(find)

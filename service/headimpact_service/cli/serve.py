@@ -13,7 +13,7 @@ from headimpact_service.deps import SCOPES, uploads_of
 from headimpact_service.jobs.engine import engine_of
 from headimpact_service.serving import listen
 from headimpact_service.serving import run as serve_until_stopped
-from headimpact_service.settings import Settings
+from headimpact_service.settings import Settings, unknown_variables
 from headimpact_service.store import keys, organisations
 from headimpact_service.store.database import Database
 
@@ -31,7 +31,7 @@ def run(*, host: str | None, port: int | None, database_url: str | None) -> None
     say(f"Headimpact {__version__}. Research use only: the model rests on adult men, and a score is no diagnosis.")
     with migrated(settings.database_url) as database:
         _first_key(database, address)
-        for warning in (*database.warnings(), *uploads_of(settings, database).warnings()):
+        for warning in (*unknown_variables(), *database.warnings(), *uploads_of(settings, database).warnings()):
             say(f"Warning: {warning}")
         app = create_app(settings, database, engine_of(settings, database))
         memory.spare_the_collector()

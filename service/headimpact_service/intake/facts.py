@@ -87,8 +87,8 @@ def with_population_note(record: ImpactRecord, athlete: Athlete | None) -> Impac
     if reason is None:
         return record
     detail = (
-        f"The published model rests on adult men; this athlete is outside them ({reason}), so its probabilities are "
-        "extrapolated."
+        f"This athlete is none of the adult men that the published model rests on ({reason}): its probabilities are "
+        "extrapolated, and so are a fitted model's whose cohort had no such athletes."
     )
     return replace(record, notes=(*record.notes, QualityNote("outside_model_population", "note", detail)))
 

@@ -11,7 +11,6 @@ from starlette.responses import Response
 
 from headimpact_service import deps
 from headimpact_service.answers import answer, no_content
-from headimpact_service.errors import Problem, not_found
 from headimpact_service.ingest.impact_json import Name, Strict, Word, Zone
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import SyncQuery
@@ -140,11 +139,7 @@ async def list_athletes(call: Call) -> Response:
 async def read_athlete(call: Call) -> Response:
     """404 once erased, or merged into another, whom the 404 names."""
     athlete_id = _id(call)
-    found = await deps.read(call.request, lambda conn: athletes.present(conn, call.data_set_id, athlete_id))
-    if found is None:
-        raise not_found("athlete")
-    if found.id != athlete_id:
-        raise Problem("not-found", f"This athlete was merged into {ids.encode('ath', found.id)}.")
+    found = await deps.read(call.request, lambda conn: athletes.require(conn, call.data_set_id, athlete_id))
     return answer(document(found), headers=etag(found.revision))
 
 

@@ -10,6 +10,7 @@ from starlette.responses import Response
 
 from headimpact_service import deps
 from headimpact_service.answers import answer
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.impact_json import Moment, Name, Strict, Text
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import ListQuery
@@ -77,9 +78,14 @@ async def report_diagnosis(call: Call) -> Response:
     body: DiagnosisBody = call.body
     athlete_id = _athlete(call)
     new = NewDiagnosis(**body.model_dump())
-    made, news = await deps.write(
-        call.request, lambda conn: diagnoses.add(conn, call.data_set_id, athlete_id, new, call.key.id)
-    )
+    try:
+        made, news = await deps.write(
+            call.request, lambda conn: diagnoses.add(conn, call.data_set_id, athlete_id, new, call.key.id)
+        )
+    except Problem as problem:
+        if problem.slug == "label-conflict" and "labels:read" not in call.key.scopes:
+            raise Problem("label-conflict", "What is stored of this session contradicts the diagnosis.") from None
+        raise
     return answer(_document(made), 201 if news else 200)
 
 

@@ -17,7 +17,7 @@ from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.routes.fit_shapes import CohortBody, FitBody, stored
 from headimpact_service.routes.job_shapes import IDEMPOTENCY_KEY, LOCATION, JobView, accepted, idempotency_key
 from headimpact_service.routes.models import Version
-from headimpact_service.store import models
+from headimpact_service.store import jobs, models
 from headimpact_service.store.jobs import Job, NewJob
 
 routes = Routes("models")
@@ -62,7 +62,7 @@ async def order_fit(call: Call) -> Response:
     if body.version is not None:
         registry.require_free(body.version)
         taken = await deps.read(call.request, lambda conn: models.get(conn, call.data_set_id, body.version or ""))
-        if taken is not None:
+        if taken is not None and not await _was_ordered(call):
             raise Problem("conflict", "There is a model of this version, and versions do not change.")
     return accepted(await _order(call, "fit", {"fit": stored(body, (await call.renewed()).terms)}))
 
@@ -95,6 +95,13 @@ async def order_rescore(call: Call) -> Response:
         "chunk": CHUNK,
     }
     return accepted(await _order(call, "rescore", arguments))
+
+
+async def _was_ordered(call: Call) -> bool:
+    """Whether the request's idempotency key has made a job: perhaps the one that made the version."""
+    key = idempotency_key(call.request)
+    known = await deps.read(call.request, lambda conn: jobs.keyed(conn, call.data_set_id, key))
+    return known is not None
 
 
 async def _order(call: Call, kind: str, arguments: dict[str, Any]) -> Job:

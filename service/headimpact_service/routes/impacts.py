@@ -62,7 +62,11 @@ LOCATION = {"Location": "The impact's address."}
     problems=(*RECORD_PROBLEMS, "not-found", "external-id-conflict", "impact-deleted"),
 )
 async def create_impact(call: Call) -> Response:
-    """Committed before the answer. With an `external_id` it is safe to send again: 200 for the same content."""
+    """Committed before the answer. With an `external_id` it is safe to send again: 200 for the same content.
+
+    What is sent again is answered with the operating points and extra criteria that it asks for; stored are those of
+    the first time.
+    """
     outcome, scored = await _stored(call, lambda new, conn: impacts.add(conn, call.data_set_id, new))
     if outcome.status == "created":
         return _answer(call, outcome.impact, 201, scored)
@@ -197,7 +201,7 @@ def _filters(query: ImpactQuery) -> ImpactFilters:
     problems=("not-found",),
 )
 async def read_impact(call: Call) -> Response:
-    """The same as the answer to its POST, without traces."""
+    """The same as the answer to the POST or PUT that stored it, without traces."""
     found = await present(call)
     return answer(impact_document(shown_to(call.key, found)), headers=etag(found.revision))
 
@@ -238,7 +242,8 @@ async def correct_impact(call: Call) -> Response:
     """The whole impact anew, also under another athlete (swapped sensors). The revision before is kept.
 
     It is scored with the device's page as it is now, also where only the context is new: the same body is a correction
-    once the device's mounting or ranges were changed. To keep the mounting of before, send it inline.
+    once the device's mounting or ranges were changed. To keep the mounting of before, send it inline. Other operating
+    points or extra criteria alone are no correction: they are answered, and what is stored stays as it is.
     """
     impact_id, revision = identifier(call), if_match(call.request, required=True)
     await present(call)

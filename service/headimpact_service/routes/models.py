@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from typing import Annotated, Any, Literal
@@ -320,10 +321,8 @@ def _meant(conn: Any, data_set_id: bytes) -> dict[str, str | None]:  # noqa: ANN
 
 def _alias_answer(name: AliasName, history: list[Alias]) -> Response:
     first = registry.DEFAULT.version if name == "active" else None
-    unsaid = Alias(name=name, version=first, revision=0, reason="", key_id=None, created_at=None)
-    now = history[-1] if history else unsaid
-    document = {"name": name, **_change(now), "history": [_change(one) for one in history or [unsaid]]}
-    return answer(document, headers=etag(now.revision))
+    changes = [_change(replace(one, version=first) if one.revision == 0 else one) for one in history]
+    return answer({"name": name, **changes[-1], "history": changes}, headers=etag(history[-1].revision))
 
 
 def _change(alias: Alias) -> dict[str, Any]:

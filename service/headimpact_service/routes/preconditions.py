@@ -7,8 +7,9 @@ import re
 from starlette.requests import Request
 
 from headimpact_service.errors import Problem, invalid_parameter
+from headimpact_service.store.revision import ANY
 
-IF_MATCH = {"If-Match": 'The ETag of the revision that is changed, `"1"`; `*` for whichever it is.'}
+IF_MATCH = {"If-Match": 'The ETag of the revision that is changed, `"1"`; `*` for whichever it is, if there is one.'}
 _REVISION = re.compile(r'"(0|[1-9]\d{0,8})"', re.ASCII)
 _ETAG = re.compile(r'(W/)?"[^"]*"')
 
@@ -19,7 +20,10 @@ def etag(revision: int) -> dict[str, str]:
 
 
 def if_match(request: Request, *, required: bool = False) -> int | None:
-    """The revision that If-Match names, None for any; 428 if it is required and absent, 412 if it cannot match."""
+    """The revision that If-Match names, `ANY` of those there are, or None where it is absent.
+
+    428 if it is required and absent, 412 if it cannot match.
+    """
     text = request.headers.get("if-match")
     if text is None:
         if required:
@@ -27,7 +31,7 @@ def if_match(request: Request, *, required: bool = False) -> int | None:
         return None
     text = text.strip()
     if text == "*":
-        return None
+        return ANY
     revision = _REVISION.fullmatch(text)
     if revision:
         return int(revision[1])

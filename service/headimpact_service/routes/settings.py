@@ -43,7 +43,9 @@ class SettingsBody(Strict):
     """What is to change; null takes a setting back to the active model's."""
 
     incidence: Incidence | None = None
-    operating_points: Annotated[list[OperatingPointBody], Field(max_length=MAX_OPERATING_POINTS)] | None = None
+    operating_points: Annotated[list[OperatingPointBody], Field(max_length=MAX_OPERATING_POINTS)] | None = Field(
+        None, description="None at all are the active model's, too; an impact that asks for `[]` gets none."
+    )
 
 
 ETAG = {"ETag": "The revision, for If-Match."}

@@ -42,15 +42,17 @@ _SUPERSEDE = update(model_aliases).where(
 
 
 def history(conn: Connection, data_set_id: bytes, name: AliasName) -> list[Alias]:
-    """All that an alias meant, oldest first."""
+    """All that an alias meant, oldest first: no version as long as nobody said anything."""
     rows = conn.execute(_HISTORY, {"data_set_id": data_set_id, "name": name})
-    return [Alias(**row._asdict()) for row in rows]
+    said = [Alias(**row._asdict()) for row in rows]
+    until = said[0].created_at if said else None
+    unsaid = Alias(name=name, version=None, revision=0, reason="", key_id=None, created_at=None, superseded_at=until)
+    return [unsaid, *said]
 
 
 def get(conn: Connection, data_set_id: bytes, name: AliasName) -> Alias:
-    """What an alias means now; no version as long as nobody said anything."""
-    kept = history(conn, data_set_id, name)
-    return kept[-1] if kept else Alias(name=name, version=None, revision=0, reason="", key_id=None, created_at=None)
+    """What an alias means now."""
+    return history(conn, data_set_id, name)[-1]
 
 
 def put(

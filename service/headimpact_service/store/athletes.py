@@ -169,7 +169,7 @@ def patch(
     if changed == present:
         return present
     if changed.external_id != present.external_id:
-        _require_free(conn, data_set_id, changed.external_id)
+        _require_free(conn, data_set_id, changed.external_id, of=athlete_id)
     return _changed(conn, data_set_id, present, changed)
 
 
@@ -206,9 +206,12 @@ def merge(
     What `into` does not say of itself is taken from the other. The other leaves a tombstone that keeps its external
     id, so that impacts that are sent under it find their way. A consent that either withdrew is withdrawn.
     """
-    source, target = require(conn, data_set_id, athlete_id), require(conn, data_set_id, into)
+    target = require(conn, data_set_id, into)
     if athlete_id == into:
         raise Problem("conflict", "An athlete cannot be merged into itself.")
+    if present(conn, data_set_id, athlete_id) == target:
+        return target  # it was done before, and its answer may not have arrived
+    source = require(conn, data_set_id, athlete_id)
     require_revision(source.revision, if_match)
     _move_all(conn, data_set_id, athlete_id, into)
     now = next_change(conn, athletes, data_set_id)
@@ -267,16 +270,23 @@ def _update(conn: Connection, athlete: Athlete) -> Athlete:
 
 
 def require(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> Athlete:
-    """An athlete who was not erased, or a `not-found` problem."""
-    found = get(conn, data_set_id, athlete_id)
+    """An athlete who was not erased, or a `not-found` problem, which says into whom one was merged."""
+    found = present(conn, data_set_id, athlete_id)
     if found is None:
         raise not_found("athlete")
+    if found.id != athlete_id:
+        raise Problem("not-found", f"This athlete was merged into {ids.encode('ath', found.id)}.")
     return found
 
 
-def _require_free(conn: Connection, data_set_id: bytes, external_id: str | None) -> None:
-    if external_id is not None and find(conn, data_set_id, external_id) is not None:
-        raise Problem("external-id-conflict", "Another athlete has this external_id.")
+def _require_free(conn: Connection, data_set_id: bytes, external_id: str | None, of: bytes | None = None) -> None:
+    found = None if external_id is None else find(conn, data_set_id, external_id)
+    if found is None:
+        return
+    if of is not None and found.merged_into == of:
+        detail = "This external_id came to the athlete with a merge: what is sent under it is this athlete's."
+        raise Problem("external-id-conflict", detail)
+    raise Problem("external-id-conflict", "Another athlete has this external_id.")
 
 
 def _athlete(row: RowMapping) -> Athlete:

@@ -95,7 +95,8 @@ class Database:
         with self.read() as conn:
             found: list[str] = self._backend.warnings(conn)
         if self.is_file and self.url.database:
-            found += disk.warnings(Path(self.url.database).resolve().parent, "the database")
+            file = Path(self.url.database).resolve()
+            found += [*disk.warnings(file.parent, "the database"), *disk.exposed(file, "the database")]
         return found
 
     def checkpoint(self) -> None:

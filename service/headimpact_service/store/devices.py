@@ -73,7 +73,7 @@ def put(
     """
     present = get(conn, data_set_id, serial)
     if present is None:
-        require_revision(0, if_match)
+        require_revision(0, if_match, exists=False)
         return _create(conn, data_set_id, serial, new), True
     require_revision(present.revision, if_match)
     changed = replace(present, **asdict(new))

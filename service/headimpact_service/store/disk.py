@@ -13,6 +13,17 @@ PRIVATE = 0o600
 """Files of people's measurements are for this user only."""
 
 
+def exposed(file: Path, what: str) -> list[str]:
+    """What an operator should know of a file that other users can read, as one that was restored may be."""
+    try:
+        mode = file.stat().st_mode & 0o777
+    except OSError:
+        return []
+    if mode & ~PRIVATE == 0:
+        return []
+    return [f"Other users of this machine may read {what} ({mode:04o}): chmod {PRIVATE:o} {file.name}"]
+
+
 def warnings(folder: Path, what: str) -> list[str]:
     """What an operator should know of a folder that is written to, as sentences; it is made if it is not there."""
     try:

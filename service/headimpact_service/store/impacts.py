@@ -39,7 +39,7 @@ from headimpact_service.store.impact_rows import (
     former_event,
 )
 from headimpact_service.store.prepared import Prepared
-from headimpact_service.store.revision import require_revision
+from headimpact_service.store.revision import ANY, require_revision
 from headimpact_service.store.score_rows import stored
 from headimpact_service.store.scores import next_number
 from headimpact_service.store.tables import former_contents, impact_revisions, impacts
@@ -261,7 +261,7 @@ def correct(
     present = _require(conn, data_set_id, impact_id)
     known = look_up(conn, data_set_id, new)
     _require_present(new, known)
-    sent_again = if_match is None or present.revision - if_match in {0, 1}
+    sent_again = if_match in {None, ANY} or present.revision - if_match in {0, 1}
     if sent_again and _is_already(conn, data_set_id, present, new, known):
         return Outcome("unchanged", present)
     require_revision(present.revision, if_match)

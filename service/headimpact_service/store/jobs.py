@@ -125,15 +125,18 @@ def find_same_request(
     conn: Connection, data_set_id: bytes, idempotency_key: str | None, request_hash: bytes | None
 ) -> Job | None:
     """The job that this idempotency key has made already; 409 if another request made it."""
+    found = keyed(conn, data_set_id, idempotency_key)
+    if found is not None and found.request_hash != request_hash:
+        raise Problem("idempotency-conflict", "This Idempotency-Key was sent before with another request.")
+    return found
+
+
+def keyed(conn: Connection, data_set_id: bytes, idempotency_key: str | None) -> Job | None:
+    """The job that an idempotency key has made."""
     if idempotency_key is None:
         return None
     row = conn.execute(_BY_KEY, {"data_set_id": data_set_id, "idempotency_key": idempotency_key}).mappings().first()
-    if row is None:
-        return None
-    found = Job(**row)
-    if found.request_hash != request_hash:
-        raise Problem("idempotency-conflict", "This Idempotency-Key was sent before with another request.")
-    return found
+    return None if row is None else Job(**row)
 
 
 def get(conn: Connection, data_set_id: bytes, job_id: bytes) -> Job | None:

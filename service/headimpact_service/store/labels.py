@@ -132,8 +132,13 @@ def put(
     present = kept[-1] if kept else None
     if present is not None and _says(present) == new:
         return present, False
-    require_revision(0 if present is None else present.number, if_match)
+    require_revision(0 if present is None else present.number, if_match, exists=_is_said(present))
     return _append(conn, data_set_id, impact_id, kept, new, key_id), True
+
+
+def _is_said(present: Label | None) -> bool:
+    """Whether an impact has a label: one that was taken back is none."""
+    return present is not None and present.outcome is not None
 
 
 def withdraw(
@@ -141,7 +146,7 @@ def withdraw(
 ) -> None:
     """Take a label back: the impact has none any more, and its history says so."""
     kept = history(conn, data_set_id, impact_id)
-    if not kept or kept[-1].outcome is None:
+    if not _is_said(kept[-1] if kept else None):
         raise not_found("label")
     require_revision(kept[-1].number, if_match)
     _append(conn, data_set_id, impact_id, kept, None, key_id)

@@ -49,6 +49,22 @@ def ensure(conn: Connection, name: str) -> Organisation:
     return made
 
 
+def known(conn: Connection, name: str) -> Organisation:
+    """The organisation of a name, made only where there is none of any name: a mistyped one is refused.
+
+    Raises
+    ------
+    ValueError
+        There are others.
+    """
+    found = find(conn, name)
+    if found is None and conn.execute(select(organisations.c.id).limit(1)).first() is not None:
+        raise ValueError(
+            "There is no organisation of that name; `headimpact keys create` makes one with its first key."
+        )
+    return found or ensure(conn, name)
+
+
 def ensure_data_set(conn: Connection, organisation_id: bytes, mode: Mode) -> bytes:
     """The data set of an organisation for a mode, made if it does not exist."""
     of_mode = select(data_sets.c.id).where(data_sets.c.organisation_id == organisation_id, data_sets.c.mode == mode)

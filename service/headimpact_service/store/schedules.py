@@ -81,7 +81,7 @@ def put(
 ) -> tuple[Schedule, bool]:
     """Make or replace a schedule, and whether it is new; the same again changes nothing."""
     present = get(conn, data_set_id, name)
-    require_revision(0 if present is None else present.revision, if_match)
+    require_revision(0 if present is None else present.revision, if_match, exists=present is not None)
     now = datetime.now(UTC)
     if present is None:
         row = asdict(new) | {

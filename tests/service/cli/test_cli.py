@@ -16,6 +16,7 @@ from sending import Api, impact_body, score_body
 from headimpact.criteria import CRITERION_KEYS
 from headimpact_service.deps import SCOPES
 from headimpact_service.pages.problems import as_markdown
+from headimpact_service.settings import unknown_variables
 from headimpact_service.store import keys
 from headimpact_service.store.database import Database
 
@@ -64,6 +65,14 @@ class TestKeys:
         assert run("keys", "revoke", key_id, "--organisation", "A")[0] == 0
         assert run("keys", "revoke", "nonsense", "--organisation", "A")[0] == 2
         assert run("keys", "list", "--organisation", "B")[0] == 2
+
+    def test_a_mistyped_organisation_is_made_by_none_of_the_other_commands(self, run: Run, tmp_path: Path) -> None:
+        file = tmp_path / "impact.json"
+        file.write_text(json.dumps(impact_body("e-1")))
+        assert run("import", str(file))[0] == 0  # the first of all
+        for command in (("import", str(file)), ("models", "list"), ("models", "promote", "x", "--reason", "y")):
+            code, _, failed = run(*command, "--organisation", "defualt")
+            assert (code, "no organisation of that name" in failed) == (2, True), command
 
 
 class TestScore:
@@ -280,3 +289,10 @@ class TestScoreOfFolders:
         code, _, failed = run("score", str(tmp_path))
         assert code == 2
         assert failed.startswith(f"headimpact: {tmp_path} is a folder, but not one set of a laboratory")
+
+
+def test_variables_that_only_look_like_settings_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HEADIMPACT_DATABASE", "sqlite:///x.db")
+    monkeypatch.setenv("HEADIMPACT_PORT", "1234")
+    [told] = [line for line in unknown_variables() if not line.startswith("HEADIMPACT_RECORDINGS")]
+    assert told.startswith("HEADIMPACT_DATABASE is set")

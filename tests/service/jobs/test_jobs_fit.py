@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,18 @@ def order(api: Api, **fields: Any) -> dict[str, Any]:
 
 
 class TestFit:
+    def test_a_fit_that_is_ordered_again_after_it_ended_is_the_same_job(
+        self, api: Api, database: Database, mine: bytes, do: Do
+    ) -> None:
+        fill(database, mine)
+        send = partial(api.post, "/v1/models/fits", json=QUICK)
+        job = send(headers={"Idempotency-Key": "k-1"}).json()
+        assert do(job)["state"] == "succeeded"
+        again = send(headers={"Idempotency-Key": "k-1"})
+        assert (again.status_code, again.json()["id"], again.json()["state"]) == (202, job["id"], "succeeded")
+        for headers in ({}, {"Idempotency-Key": "k-2"}):
+            assert send(headers=headers).status_code == 409
+
     def test_a_fit_becomes_a_version_with_report_page_and_alias(
         self, api: Api, database: Database, mine: bytes, do: Do
     ) -> None:
@@ -341,7 +354,13 @@ class TestService:
         register(api, spring)
         self.promote(api, "spring", 0)
         back = self.promote(api, "laksari-2020", 1)
-        assert [change["version"] for change in back.json()["history"]] == ["spring", "laksari-2020"]
+        assert [change["version"] for change in back.json()["history"]] == [
+            "laksari-2020",
+            "spring",
+            "laksari-2020",
+        ]
+        first, second, _ = back.json()["history"]
+        assert (first["revision"], first["created_at"], first["superseded_at"]) == (0, None, second["created_at"])
         assert back.headers["etag"] == '"2"'
         assert api.create("e")["score"]["model"] == "laksari-2020"
         assert self.promote(api, "spring", 1).status_code == 412

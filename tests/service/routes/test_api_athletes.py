@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from sending import Api, impact_body
@@ -96,3 +97,24 @@ class TestErase:
         assert api.patch(address, key=other, json={}).status_code == 404
         assert api.delete(address, key=other).status_code == 404
         assert api.get(address).status_code == 200
+
+
+class TestMerge:
+    def merge(self, api: Api, source: str, target: str, **headers: str) -> Any:
+        return api.post(f"/v1/athletes/{source}/merge", json={"into": target}, headers=headers)
+
+    def test_a_merge_that_is_sent_again_is_done(self, api: Api) -> None:
+        one, two, three = (api.post("/v1/athletes", json={"external_id": f"p-{n}"}).json()["id"] for n in range(3))
+        first = self.merge(api, one, two, **{"If-Match": '"1"'})
+        again = self.merge(api, one, two, **{"If-Match": '"1"'})
+        assert (first.status_code, again.status_code, again.json()) == (200, 200, first.json())
+        elsewhere = self.merge(api, one, three)
+        assert (elsewhere.status_code, two in elsewhere.json()["detail"]) == (404, True)
+        into = self.merge(api, three, one)
+        assert (into.status_code, two in into.json()["detail"]) == (404, True)
+
+    def test_a_name_that_was_merged_in_cannot_be_taken_as_the_own(self, api: Api) -> None:
+        one, two = (api.post("/v1/athletes", json={"external_id": f"p-{n}"}).json()["id"] for n in range(2))
+        self.merge(api, one, two)
+        refused = api.patch(f"/v1/athletes/{two}", json={"external_id": "p-0"})
+        assert (refused.status_code, "with a merge" in refused.json()["detail"]) == (409, True)

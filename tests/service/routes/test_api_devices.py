@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from sending import Api
+from sending import Api, impact_body
 
 MIRROR = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
 TURN = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
@@ -61,3 +61,19 @@ class TestPut:
         other = make_key(organisation="other")
         assert api.get("/v1/devices/mg-1", key=other).status_code == 404
         assert api.get("/v1/devices", key=other).json()["data"] == []
+
+
+def test_if_match_of_anything_names_nothing_that_is_not_there(api: Api) -> None:
+    anything = {"If-Match": "*"}
+    impact = f"/v1/impacts/{api.create('e-1')['id']}/label"
+    label = {"outcome": "no_concussion", "basis": "other"}
+    schedule = {"cron": "0 3 * * 1"}
+    for address, body in (("/v1/devices/mg-1", {}), ("/v1/schedules/weekly", schedule), (impact, label)):
+        assert api.put(address, json=body, headers=anything).status_code == 412, address
+        assert api.put(address, json=body).status_code in {200, 201}, address
+        assert api.put(address, json=body, headers=anything).status_code == 200, address
+    api.delete(impact)
+    assert api.put(impact, json=label, headers=anything).status_code == 412
+    event = api.get("/v1/impacts").json()["data"][0]["id"]
+    assert api.put(f"/v1/impacts/{event}", json=impact_body("e-1", 2.0), headers=anything).status_code == 200
+    assert api.patch("/v1/settings", json={"incidence": 0.01}, headers=anything).status_code == 200

@@ -137,6 +137,11 @@ class TestSync:
         answer = api.get("/v1/impacts", params={"updated_since": moment})
         assert (answer.status_code, answer.json()["errors"][0]["parameter"]) == (422, "updated_since")
 
+    def test_updated_since_may_have_nanoseconds(self, api: Api) -> None:
+        made = api.create("e-1")
+        rows = api.get("/v1/impacts", params={"updated_since": "2026-11-20T19:04:05.123456789Z"}).json()["data"]
+        assert [row["id"] for row in rows] == [made["id"]]
+
 
 class TestFilters:
     def test_each_filter_selects(self, api: Api) -> None:
@@ -162,6 +167,12 @@ class TestFilters:
         found = api.get("/v1/impacts", params={"criterion": "vtcp", "min_probability": level}).json()["data"]
         assert [row["id"] for row in found] == [strong["id"]]
         assert api.get("/v1/impacts?criterion=vtcp").status_code == 422
+
+    @pytest.mark.parametrize("value", [0.0002639375425042943, 2.6393754250429e-4, 0.012345678901234567, 5e-324])
+    def test_a_probability_may_be_written_with_all_its_digits(self, api: Api, value: float) -> None:
+        for text in (repr(value), f"{value:.30f}"):
+            found = api.get("/v1/impacts", params={"criterion": "bam", "min_probability": text})
+            assert found.status_code == 200, text
 
     def test_an_athlete_that_is_none_of_ours_has_no_impacts(self, api: Api) -> None:
         api.create()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -178,3 +179,15 @@ class TestMoved:
         assert [(one["outcome"], one["labelled_by"], one["diagnosis"]) for one in found["history"]] == [
             (None, None, None)
         ]
+
+
+def test_what_a_label_says_is_not_told_to_a_key_that_may_not_read_it(api: Api, make_key: Callable[..., str]) -> None:
+    impact = in_session(api, "e-1", 1.0)
+    api.put(f"/v1/impacts/{impact}/label", json=OBSERVED | {"outcome": "no_concussion"})
+    address, body = f"/v1/athletes/{athlete_of(api, impact)}/diagnoses", {"session_id": "s-1", "basis": "other"}
+    told = api.post(address, json=body, key=make_key("labels:write", "labels:read"))
+    untold = api.post(address, json=body, key=make_key("labels:write"))
+    assert (told.status_code, untold.status_code) == (409, 409)
+    assert "no_concussion" in told.text
+    assert "no_concussion" not in untold.text
+    assert impact not in untold.text

@@ -350,3 +350,16 @@ def test_a_new_file_and_what_lies_beside_it_are_for_this_user_only(tmp_path: Pat
     assert organisations_made.name == "o"
     assert {"h.db", "h.db-wal"} <= set(modes)
     assert set(modes.values()) == {0o600}
+
+
+@pytest.mark.backend("sqlite")
+@pytest.mark.parametrize(("mode", "told"), [(0o600, False), (0o400, False), (0o640, True), (0o644, True)])
+def test_a_file_that_others_may_read_is_warned_of(tmp_path: Path, mode: int, *, told: bool) -> None:
+    file = tmp_path / "restored.db"
+    database = Database(f"sqlite:///{file}")
+    database.migrate()
+    try:
+        file.chmod(mode)
+        assert any(f"{mode:04o}" in warning for warning in database.warnings()) == told
+    finally:
+        database.close()
