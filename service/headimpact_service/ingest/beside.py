@@ -7,6 +7,8 @@ from dataclasses import replace
 
 from headimpact.recording import SignalName
 from headimpact_service.ingest.axis_peaks import unclear_axis
+from headimpact_service.ingest.conventions import conventions
+from headimpact_service.ingest.facts_beside import event_columns
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.layout import Layout
 from headimpact_service.ingest.lines_above import rates_stated
@@ -51,6 +53,25 @@ def with_axis_peaks(layout: Layout, found: Mapping[int, SignalName], table: Tabl
         if column in table.wordless:
             raise unclear_axis(layout.named(column), signal)
     return replace(layout, axis_peaks=beside)
+
+
+def with_conventions(layout: Layout, headings: Headings, table: Table, *, axes: bool, units: bool) -> Layout:
+    """The layout, with the columns beside it that may say other units or axes, where these are open."""
+    passed = _read_or_wordless(layout, table)
+    return replace(layout, conventions=conventions(headings, passed, axes=axes, units=units))
+
+
+def with_events(layout: Layout, headings: Headings, table: Table) -> Layout:
+    """The layout, with the columns beside it that may say when an impact was, if none that is read does."""
+    if layout.occurred_at:
+        return layout
+    return replace(layout, events=event_columns(headings, _read_or_wordless(layout, table)))
+
+
+def _read_or_wordless(layout: Layout, table: Table) -> set[int]:
+    """The columns that are read, but for those that are only held against each other, and those without text."""
+    held = {*layout.unread.columns, *(other.column for other in layout.others.clocks)}
+    return ({*layout.numbers, *layout.texts} - held) | {*table.wordless}
 
 
 def with_unread(layout: Layout, headings: Headings, table: Table, group_by: Sequence[object] | None) -> Layout:

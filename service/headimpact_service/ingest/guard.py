@@ -361,4 +361,5 @@ def _columns(frame: Frame, numbers: Sequence[int], texts: Sequence[int]) -> Colu
             column: Words(at, list(map(str, known))) for column, at, known in zip(texts, places, words, strict=True)
         },
         lengths=lengths,
+        joined=bool(frame.fields["joined"]),
     )

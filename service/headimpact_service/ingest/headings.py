@@ -11,6 +11,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest import mapping as mappings
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.spelling import MAX_COMPACT, compact, unit_at_end, unit_ending, unit_spelled
+from headimpact_service.ingest.table import DURATION
 from headimpact_service.ingest.time_headings import may_be_times, sensor_of_times, unit_of_times
 
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
@@ -89,7 +90,8 @@ class Headings:
 
 
 def _with_unit(heading: str, unit: str) -> str:
-    return heading if compact(heading).endswith(compact(unit)) else f"{heading} {unit}"
+    says = compact(heading).endswith(compact(unit)) or (unit == DURATION and unit_ending("time", heading) is not None)
+    return heading if says else f"{heading} {unit}"
 
 
 def _repeated(places: Mapping[str, list[int]]) -> dict[str, list[int]]:

@@ -45,7 +45,7 @@ class ImpactTimes:
         clock = signal.clock or self.clock
         if self.layout.ends_alone(name) or self.samples.has_ends:
             rows = self._until_empty(signal, None if signal.clock is None else signal.clock.column, rows)
-        rate = self._said_rate(signal, reading)
+        rate = self._said_rate(name, signal, reading)
         if clock is None or (rate is not None and self._stands_still(clock, rows)):
             return self._counted(Track(name, rows, rate or self.mapping.sample_rate_hz, None, 1.0))
         stamps = self._stamps(clock.column, rows)
@@ -53,15 +53,23 @@ class ImpactTimes:
             _require_on_time(stamps * clock.milliseconds, rate)
         return Track(name, rows, rate, stamps, clock.milliseconds, clock.dated)
 
-    def _said_rate(self, signal: SignalLayout, reading: Reading) -> float | None:
+    def _said_rate(self, name: SignalName, signal: SignalLayout, reading: Reading) -> float | None:
         """The rate that the sender, the impact's row or the mapping says; 422 where they differ.
 
         A signal that has a rate of its own, and no times, does not go by those that the others share.
         """
         asked = self.mapping.sample_rate_hz if "sample_rate_hz" in self.plan.required else None
         beside, own = self.options.sample_rate_hz, signal.sample_rate_hz if signal.clock is None else None
+        if own and self._is_of_the_others(name):
+            return own
         _require_one_rate([beside, own] if own else [beside, reading.sample_rate_hz, asked])
         return own or beside or reading.sample_rate_hz or signal.sample_rate_hz or asked
+
+    def _is_of_the_others(self, name: SignalName) -> bool:
+        """Whether a rate beside the file is that of other signals: the sender's mapping names this one's."""
+        sent = None if self.options.mapping is None else self.options.mapping.columns_of(name)
+        others = (one for other, one in self.layout.signals.items() if other != name)
+        return sent is not None and sent.sample_rate_hz is not None and any(not one.is_apart for one in others)
 
     def _stands_still(self, clock: Clock, rows: Rows) -> bool:
         """Whether a column of times says when the impact was, and not its samples."""
@@ -276,10 +284,9 @@ def _other(heading: str, rate: float, what: str = "column") -> Problem:
         f"The {what} {heading} says {rate:.5g} samples per second, at which no signal is read. If it is one sensor's, "
         "say so in a mapping: each sensor's times, as "
         '{"linear_acceleration": {"time": {"column": ..., "unit": ...}}, "angular_velocity": {"time": {"column": ..., '
-        """"unit": ...}}}, or that one's rate, as {"angular_velocity": {"sample_rate_hz": ...}}. If it is of """
-        'something else, name the times that count in the mapping, as {"time": {"column": ..., "unit": ...}}, or say '
-        '{"time": null} '
-        "in it where a rate counts.",
+        '"unit": ...}}}, or that one\'s rate, as {"angular_velocity": {"sample_rate_hz": ...}}. If it is of something '
+        'else, name the times that count in the mapping, as {"time": {"column": ..., "unit": ...}}, or say '
+        '{"time": null} in it where a rate counts.',
         "rate-differs",
         parameter="sample_rate_hz",
     )

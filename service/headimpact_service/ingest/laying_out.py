@@ -16,6 +16,7 @@ from headimpact_service.ingest.presets import unit_of
 from headimpact_service.ingest.scaled_units import SCALED_UNITS, unit_written
 from headimpact_service.ingest.spelling import unit_ending, unit_spelled
 from headimpact_service.ingest.supplied import Kind, Supplied, supplied_in
+from headimpact_service.ingest.table import DURATION
 
 
 def lay_out(mapping: Mapping, headings: Headings, required: frozenset[str]) -> Layout:
@@ -200,9 +201,11 @@ def _clocks(mapping: Mapping, headings: Headings, required: bool, *, own: bool) 
 
 
 def _clock_in(column: int, unit: str, headings: Headings) -> Clock:
-    """A column of stamps in a unit, unless the file says another beside its heading; dates have a unit of their own."""
+    """A column of stamps in a unit, unless the file says another beside its heading; times of a type have their own."""
     if column in headings.dated:
         return Clock(column, TIME_UNITS[DATES_IN], dated=True)
+    if headings.units.get(column) == DURATION:
+        return Clock(column, TIME_UNITS["us"])
     heading = headings.written[column]
     for beside in (unit_spelled("time", headings.units.get(column)), unit_ending("time", heading)):
         if beside not in {None, unit}:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 
 from headimpact.quality import QualityNote
 from headimpact.recording import AXES, SignalName
+from headimpact_service.ingest.conventions import NO_CONVENTIONS, Conventions
 from headimpact_service.ingest.date_order import DateOrder
 from headimpact_service.ingest.other_times import NO_OTHERS, OtherTimes
 from headimpact_service.ingest.supplied import Supplied
@@ -86,6 +88,10 @@ class Layout:
     """What may say other times than those that are read."""
     unread: Unread = NOTHING_UNREAD
     """What may tell that the rows are several impacts, where nothing that is read would."""
+    events: tuple[tuple[int, ...], ...] = ()
+    """What may say when an impact was, where no column that is read does."""
+    conventions: Conventions = NO_CONVENTIONS
+    """What may say another direction of the axes, or another unit, than those that are read."""
     notes: tuple[QualityNote, ...] = ()
     """Of columns that seem to be a signal and are not read."""
 
@@ -143,7 +149,8 @@ class Layout:
         tables = (*self.context.values(), *self.reading.values())
         named = (*one_each, *self.keys, *self.occurred_at, *tables, *self.peaks, *self.axis_peaks)
         others = [rate.column for rate in self.others.rates]
-        return sorted({column for column in (*named, *others, *self.unread.columns) if column is not None})
+        beside = (*others, *self.unread.columns, *self.conventions.columns, *chain.from_iterable(self.events))
+        return sorted({column for column in (*named, *beside) if column is not None})
 
     @property
     def peaks(self) -> list[int]:

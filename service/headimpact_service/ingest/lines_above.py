@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterator, Sequence
 
 from headimpact_service.ingest.cells import number_said
-from headimpact_service.ingest.spelling import compact, words_of
-from headimpact_service.ingest.time_headings import hertz_of_rates, period_of_samples
+from headimpact_service.ingest.mapping import TIME_UNITS
+from headimpact_service.ingest.spelling import compact, unit_spelled, words_of
+from headimpact_service.ingest.time_headings import hertz_of_rates, period_of_samples, speaks_of_samples
 
 Rows = Sequence[Sequence[str]]
 
@@ -17,44 +18,102 @@ _NUMBER = re.compile(r"([+-]?[0-9.,]+(?:[eE][+-]?[0-9]+)?)\s*([A-Za-zµ/]*)")
 """A number, and its unit if that stands behind it."""
 _UNIT = re.compile(r"[(\[]?([A-Za-zµ/]{1,20})[)\]]?")
 """A unit in a cell of its own."""
-_THOUSANDS = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
+_THOUSANDS = re.compile(r"[1-9][0-9]{0,2}[.,][0-9]{3}")
+_PARTS = re.compile("[.,]")
 """Of samples per second, of which nobody has so few to three digits."""
 _COMMENT = "#%;/*! "
 """What lines of comment begin with."""
-_ABOUT_AXES = frozenset({"axes", "axis", "coordinate", "coordinates", "orientation", "convention", "frame", "polarity"})
-_SAE = re.compile(r"saej?211(1|iso6487)?")
+_ABOUT_AXES = frozenset(
+    {
+        *("axes", "axis", "coordinate", "coordinates", "orientation", "convention", "frame", "polarity", "sign"),
+        *("achsen", "achse", "vorzeichen", "koordinatensystem", "koordinaten", "axe", "repere", "ejes", "assi"),
+    }
+)
+_SAE = re.compile(r"saej?(211|1733)|j(211|1733)|iso6487|^sae$")
+_TURNED = re.compile(
+    r"\bz\W{0,3}((is|points) )?(down(wards?)?|unten)\b|\by\W{0,3}((is|points) )?(to the )?(right|rechts)\b",
+    re.IGNORECASE,
+)
+_STEPS = frozenset({"period", "deltax", "xdelta", "deltat", "xincrement", "wfincrement"})
+"""What programs call the time between two samples."""
+_IN_WORDS = re.compile(
+    r"(?P<number>[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)\s*"
+    r"(?:(?P<hertz>k?hz)|(?P<samples>k?sa?/s|k?sps|samples?\s*(?:/|per)\s*s(?:ec(?:onds?)?)?)|(?P<period>[mµu]?s(?:ec)?))\b",
+    re.IGNORECASE,
+)
+LEAST_HZ = 100.0
+"""Of a time between two samples: a longer one is that of something else."""
 
 
 def rates_stated(rows: Rows) -> Iterator[tuple[str, float]]:
-    """The sample rates that rows state, and the rows' names: a number in its cell or in the one behind it [Hz]."""
-    for name, cells in _facts(rows):
-        found = next((place for place, cell in enumerate(cells) if _NUMBER.fullmatch(cell)), None)
-        if found is None or (read := _NUMBER.fullmatch(cells[found])) is None:
-            continue
-        behind = _UNIT.fullmatch(cells[found + 1]) if len(cells) > found + 1 else None
-        beside = read[2] or (behind[1] if behind else None)
-        hertz, period_ms = hertz_of_rates(name, beside, fs_is_rate=True), period_of_samples(name, beside)
-        text = read[1].replace(",", "") if hertz is not None and _THOUSANDS.fullmatch(read[1]) else read[1]
-        number = number_said(text)
-        if number is None:
-            continue
-        if hertz is not None:
-            yield name, number * hertz
-        elif period_ms is not None and number > 0.0:
-            yield name, 1000.0 / (number * period_ms)
+    """The sample rates that rows state, and the rows' names: a number in its cell, or one within a sentence [Hz]."""
+    for name, cells in facts_stated(rows):
+        found = _rate_in_cells(name, cells) or _rate_in_words(" ".join([name, *cells]))
+        if found is not None:
+            yield name, found
+
+
+def _rate_in_cells(name: str, cells: Sequence[str]) -> float | None:
+    """The rate of a row whose name is that of a rate or of a period, with its unit behind either."""
+    found = next((place for place, cell in enumerate(cells) if _NUMBER.fullmatch(cell)), None)
+    if found is None or (read := _NUMBER.fullmatch(cells[found])) is None:
+        return None
+    behind = _UNIT.fullmatch(cells[found + 1]) if len(cells) > found + 1 else None
+    beside = read[2] or (behind[1] if behind else None)
+    hertz, period_ms = hertz_of_rates(name, beside, fs_is_rate=True), period_of_samples(name, beside)
+    if period_ms is None and compact(name) in _STEPS and (unit := unit_spelled("time", beside)) is not None:
+        period_ms = TIME_UNITS[unit]
+    return _rate(_number(read[1], hertz), hertz, period_ms)
+
+
+def _rate_in_words(text: str) -> float | None:
+    """The rate in a sentence about sampling: `Data were sampled at 2000 Hz`, `Sampling interval 0.5 ms`."""
+    found = _IN_WORDS.search(text)
+    if found is None or not (found["samples"] or speaks_of_samples(text)):
+        return None
+    unit = unit_spelled("time", found["period"])
+    of_rate = 1000.0 if (found["hertz"] or found["samples"] or "").lower().startswith("k") else 1.0
+    hertz = of_rate if unit is None else None
+    return _rate(_number(found["number"], hertz), hertz, None if unit is None else TIME_UNITS[unit])
+
+
+def _number(text: str, hertz: float | None) -> float | None:
+    """A number as it is written; in hertz, of which nobody has so few, points and commas that part thousands go."""
+    number = number_said(text)
+    few = number is None or number < LEAST_HZ
+    return number_said(_PARTS.sub("", text)) if hertz == 1.0 and few and _THOUSANDS.fullmatch(text) else number
+
+
+def _rate(number: float | None, hertz: float | None, period_ms: float | None) -> float | None:
+    if number is None or number <= 0.0:
+        return None
+    if hertz is not None:
+        return number * hertz
+    found = None if period_ms is None else 1000.0 / (number * period_ms)
+    return found if found is not None and found >= LEAST_HZ else None
 
 
 def axes_stated(rows: Rows) -> str | None:
     """What rows call the axes where they state those of SAE J211."""
-    for name, cells in _facts(rows):
-        if not _ABOUT_AXES.isdisjoint(words_of(name)):
-            found = next((cell for cell in cells if _SAE.fullmatch(compact(cell))), None)
+    for name, cells in facts_stated(rows):
+        if speaks_of_axes(name):
+            found = next((cell for cell in cells if are_sae(cell)), None)
             if found is not None:
                 return found
     return None
 
 
-def _facts(rows: Rows) -> Iterator[tuple[str, list[str]]]:
+def speaks_of_axes(heading: str) -> bool:
+    """Whether a row's name or a heading is about the directions of the axes."""
+    return not _ABOUT_AXES.isdisjoint(words_of(heading))
+
+
+def are_sae(text: str) -> bool:
+    """Whether a text says that axes are those of SAE J211: by its name, or by y to the right or z down."""
+    return _SAE.search(compact(text)) is not None or _TURNED.search(text) is not None
+
+
+def facts_stated(rows: Rows) -> Iterator[tuple[str, list[str]]]:
     """Rows as a name and what is said for it."""
     for row in rows:
         name, *cells = [cell.strip() for cell in row] or [""]

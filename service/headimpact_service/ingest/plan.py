@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from headimpact_service.ingest.facts_beside import NOTHING_ABOVE, FactsAbove
 from headimpact_service.ingest.file_names import NOT_NAMED, NamedFacts
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.options import ImportOptions
@@ -19,3 +20,4 @@ class Plan:
     options: ImportOptions
     format: str
     named: NamedFacts = NOT_NAMED
+    above: FactsAbove = NOTHING_ABOVE

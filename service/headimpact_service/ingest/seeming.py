@@ -27,6 +27,8 @@ _LETTERS: dict[str, SignalName] = {
     **dict.fromkeys(("ax", "ay", "az"), "linear_acceleration"),
     **dict.fromkeys(("wx", "wy", "wz"), "angular_velocity"),
 }
+_AXIS = re.compile(r"(?<![a-z][a-z])([xyz])$")
+"""The axis that a word is, or ends in behind one letter: `x`, `rx`."""
 _CODE = re.compile(r"[0-9?]?[0-9A-Z?]{9,11}(AC|AV|AA)[XYZ][0-9A-Z?]")
 """A channel's code as ISO-MME has it: 11HEADCG00H3ACXA."""
 _CODED: dict[str, SignalName] = {
@@ -110,11 +112,10 @@ def unnamed(layout: Layout, headings: Headings, table: Table) -> list[QualityNot
         return []
     found: dict[tuple[str, ...], dict[str, str]] = {}
     for column, heading in enumerate(headings.written):
-        listed = words_of(heading)
-        axes = [word for word in listed if word in AXES]
+        axes = [(_AXIS.sub("*", word), axis[1]) for word in words_of(heading) if (axis := _AXIS.search(word))]
         if len(axes) == 1 and column not in layout.numbers and table.has_samples(column):
-            alike = tuple("*" if word in AXES else word for word in listed)
-            found.setdefault(alike, {}).setdefault(axes[0], heading)
+            alike = tuple(_AXIS.sub("*", word) for word in words_of(heading))
+            found.setdefault(alike, {}).setdefault(axes[0][1], heading)
     return [_unnamed(list(by_axis.values())) for by_axis in found.values() if len(by_axis) == len(AXES)]
 
 
@@ -146,7 +147,7 @@ def _spoken_of(heading: str, beside: str | None) -> Iterator[SignalName]:
         return
     if words & _ACCELERATION or "alpha" in words:
         yield "angular_acceleration" if words & _TURNING or "alpha" in words else "linear_acceleration"
-    elif words & _GYROSCOPE or (words & _TURNING and words & _VELOCITY):
+    elif words & _GYROSCOPE or (words & _TURNING and words & _VELOCITY) or (listed[:1] == ["w"] and len(listed) > 1):
         yield "angular_velocity"
     elif listed and listed[-1] in _LETTERS:
         yield _LETTERS[listed[-1]]

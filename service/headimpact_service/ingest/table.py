@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+DURATION = "duration us"
+"""The unit of a column whose type says that it holds times: microseconds, whatever its heading or a mapping says."""
 
 
 @dataclass(frozen=True, slots=True)

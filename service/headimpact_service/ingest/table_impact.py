@@ -16,6 +16,8 @@ from headimpact.quality import QualityNote, check_reported_peak, check_reported_
 from headimpact.recording import Mounting, Recording, Signal, SignalName
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
+from headimpact_service.ingest.conventions import require_axes, require_units
+from headimpact_service.ingest.facts_beside import FactsAbove, moment_said
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.formula_cells import name_in, unguarded, unguarded_name
 from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
@@ -64,17 +66,19 @@ class TableImpact:
         """The impact, with what the sender gave beside the file in place of what the file says."""
         options, named = self.options, self.plan.named
         self.labels.require_one_impact(options.time_zone)
+        self._require_conventions()
         unscorable = self._text(self.layout.unscorable)
         recording = self._recording(scorable=unscorable is None)
-        athlete = options.athlete or self._name("athlete", self.layout.athlete)
+        above = self._above()
+        athlete = options.athlete or self._name("athlete", self.layout.athlete) or above.athlete
         by_id = options.athlete is None and self._is_our_id(athlete)
         return ImpactRecord(
             recording=recording,
             external_id=self._name("external_id", self.layout.external_id) or named.external_id,
             athlete_id=athlete if by_id else None,
             athlete_external_id=None if by_id else athlete,
-            occurred_at=options.occurred_at or self._occurred_at() or named.occurred_at,
-            device_serial=options.device or self._name("device", self.layout.device) or named.device,
+            occurred_at=options.occurred_at or self._occurred_at() or above.occurred_at or named.occurred_at,
+            device_serial=options.device or self._name("device", self.layout.device) or above.device or named.device,
             context=self._context(),
             metadata=self._metadata(),
             notes=tuple(self.notes),
@@ -84,6 +88,16 @@ class TableImpact:
             ),
             needs_device_mounting=self._location == "sensor" and recording.mounting is None,
         )
+
+    def _require_conventions(self) -> None:
+        """Refuse columns that say other axes or units than those that are read."""
+        layout = self.layout
+        for column in layout.conventions.axes:
+            require_axes(layout.named(column), self.labels.said(column))
+        units = {name: signal.unit for name, signal in layout.signals.items()}
+        for column in layout.conventions.units:
+            for text in self.labels.all_said(column):
+                require_units(layout.named(column), text, units)
 
     def sent_name(self) -> str | None:
         """What the file calls the impact."""
@@ -271,10 +285,32 @@ class TableImpact:
         texts = tuple((field, text) for field, text in cells if text is not None)
         return dict(context_of(texts)) if texts else {}
 
+    def _above(self) -> FactsAbove:
+        """What rows above the headings say of the impact, as far as no column is for it."""
+        above, layout = self.plan.above, self.layout
+        several = layout.keys or self.samples.window.columns.lengths is not None
+        return FactsAbove(
+            athlete=None if layout.athlete is not None else checked_name(above.athlete, "athlete"),
+            device=None if layout.device is not None else checked_name(above.device, "device"),
+            occurred_at=None if layout.occurred_at or several else above.occurred_at,
+        )
+
+    def _when(self) -> datetime | None:
+        """When the impact was, as columns say that no field is for, if all its rows say one time."""
+        for columns in self.layout.events:
+            told = [self.labels.all_said(column) for column in columns]
+            if all(len(texts) == 1 for texts in told) and (
+                when := moment_said([text for (text,) in told], self.options.time_zone)
+            ):
+                return when
+        return None
+
     def _occurred_at(self) -> datetime | None:
         columns = self.layout.occurred_at
-        if not columns or self.options.occurred_at is not None:
+        if self.options.occurred_at is not None:
             return None
+        if not columns:
+            return self._when()
         parts = {self.layout.headings[column]: self._text(column) for column in columns}
         return moment(parts, self.options.time_zone, self.layout.date_order)
 

@@ -8,7 +8,15 @@ from dataclasses import replace
 from headimpact.quality import words
 from headimpact.recording import SIGNALS, SignalName
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.beside import with_axis_peaks, with_other_times, with_supplied, with_unread
+from headimpact_service.ingest.beside import (
+    with_axis_peaks,
+    with_conventions,
+    with_events,
+    with_other_times,
+    with_supplied,
+    with_unread,
+)
+from headimpact_service.ingest.facts_beside import facts_above
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.file_names import named_facts
 from headimpact_service.ingest.headings import Headings, layout_problem
@@ -51,6 +59,7 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
     lone = {place for place in range(len(table.headings)) if not table.has_samples(place)}
     headings = Headings(table.headings, table.units, table.dated, lone)
     plan = _plan(headings, options, format_name)
+    plan = replace(plan, above=facts_above(table.above, options.time_zone))
     _require_sensor(plan.mapping)
     layout = _laid_out(plan, headings)
     layout = _require_read(layout, headings, options, table)
@@ -66,6 +75,10 @@ def read_table(table: Table, options: ImportOptions, *, format_name: str) -> Ite
             layout = with_axis_peaks(layout, preset_named(plan.preset).axis_peaks(headings), table)
     if not table.parted:
         layout = with_unread(layout, headings, table, None if options.mapping is None else options.mapping.group_by)
+    says_units = options.mapping is not None and _names_signals(options.mapping)
+    layout = with_conventions(layout, headings, table, axes=not _says_axes(layout, plan), units=not says_units)
+    if options.occurred_at is None:
+        layout = with_events(layout, headings, table)
     blocks = table.blocks(layout.numbers, layout.texts)
     max_single = MAX_SAMPLES + (plan.mapping.drop_rows or 0)
     count = 0
@@ -223,11 +236,17 @@ def _names_columns(mapping: Mapping) -> Iterator[str]:
             yield from (f"{name}.{field}" for field, spellings in value.items() if spellings is not None)
 
 
+def _says_axes(layout: Layout, plan: Plan) -> bool:
+    """Whether the sender, a column that is read or the device's layout says the direction of the axes."""
+    sent = plan.options.mapping
+    if plan.options.axes is not None or "axes" in layout.reading or plan.mapping.axes == "sae_j211":
+        return True
+    return sent is not None and (sent.axes is not None or (sent.reading or {}).get("axes", ()) is None)
+
+
 def _require_no_other_axes(layout: Layout, plan: Plan, table: Table) -> None:
     """Refuse to take the axes for anatomical where a row above the headings says that they are SAE's."""
-    sent = plan.options.mapping
-    said = plan.options.axes is not None or (sent is not None and sent.axes is not None) or "axes" in layout.reading
-    if said or plan.mapping.axes == "sae_j211" or (stated := axes_stated(table.above)) is None:
+    if _says_axes(layout, plan) or (stated := axes_stated(table.above)) is None:
         return
     raise file_fault(
         f"A row above the headings says {stated} of the axes, which is not read: give axes beside the file (sae_j211, "

@@ -35,13 +35,14 @@ _RATES = frozenset(
         *("dt", "step", "timestep", "interval", "period", "tvec", "tms", "ts", "tt", "timebase"),
     }
 )
-_RATE = frozenset({"rate", "frequency", "freq", "frequenz", "frequence", "frecuencia", "frequenza"})
+_RATE = frozenset({"rate", "frequency", "freq", "frequenz", "frequence", "frecuencia", "frequenza", "taux"})
 _OF_SAMPLES = frozenset(
     {
         *("sample", "samples", "sampling", "acquisition", "logging"),
         *("abtast", "echantillonnage", "acquisizione", "muestreo", "campionamento"),
     }
 )
+_OF_SAMPLED = _OF_SAMPLES | {"sampled", "acquired", "recorded", "logged", "daq"}
 _TRIGGER = frozenset({"trigger", "triggered", "rel", "relative", "contact", "zero"})
 _PERIODS = frozenset({"dt", "interval", "period", "step", "abtastintervall", "abtastperiode"})
 _ALONE = frozenset(
@@ -50,6 +51,8 @@ _ALONE = frozenset(
         *("samplefreq", "samplingfreq", "samplefrequency", "samplingfrequency"),
     }
 )
+_PER_SECOND = re.compile(r"samples?\s*(/|per)\s*s(ec(onds?)?)?", re.IGNORECASE)
+_SAMPLES_PER_S = {"s/s": 1.0, "sa/s": 1.0, "sps": 1.0, "ks/s": 1000.0, "ksa/s": 1000.0, "ksps": 1000.0}
 _NOT_OF_SAMPLES = frozenset(
     {
         *("filter", "cut", "cutoff", "corner", "lowpass", "highpass", "bandwidth"),
@@ -97,6 +100,12 @@ def names_trigger(heading: str) -> bool:
     return bool(words & _TIMES and words & _TRIGGER)
 
 
+def speaks_of_samples(text: str) -> bool:
+    """Whether a sentence is about how samples were taken, and not about a filter or another instrument."""
+    words = _words(text)
+    return bool(words & (_OF_SAMPLED | _RATE | _ALONE)) and not words & (_NOT_OF_SAMPLES | _OTHER_RATES)
+
+
 def period_of_samples(heading: str, beside: str | None) -> float | None:
     """Milliseconds that make one of what a column of the samples' period may say; None for any other heading."""
     words = _words(heading)
@@ -125,13 +134,16 @@ def sensor_of_times(heading: str) -> SignalName | None:
 def hertz_of_rates(heading: str, beside: str | None, *, fs_is_rate: bool) -> float | None:
     """How many hertz make one of what a column of a sample rate may say; None for any other heading.
 
-    Of one sensor `fs` may be its full scale, unless the table has a rate of this name.
+    Of one sensor `fs` behind its name may be its full scale, unless the table has a rate of this name.
     """
+    if _PER_SECOND.fullmatch(heading.strip()):
+        return 1.0
+    fs_is_rate = fs_is_rate or words_of(heading)[:1] == ["fs"]
     words = _words(heading) | _words(beside or "")
     if words & (_NOT_OF_SAMPLES | _OF_SIGNALS | _OTHER_RATES):
         return None
-    if words & _OF_SAMPLES and (beside or "").lower() in {"s/s", "sa/s", "sps"}:
-        return 1.0
+    if words & _OF_SAMPLES and (thousands := _SAMPLES_PER_S.get((beside or "").lower())) is not None:
+        return thousands
     if len(words) == 1 and words & (_RATE | {"hz", "fs", "srate", "fsamp", "fsample"}):
         return 1.0
     in_hertz = "hz" in words and words & (_OF_SAMPLES | _ANY_SENSOR | _RATE | {"fs"})

@@ -7,7 +7,7 @@ A new format is a reader and a place in this module: in :data:`READERS` if its c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.binary_formats import (
@@ -31,6 +31,8 @@ from headimpact_service.ingest.source import Source
 from headimpact_service.ingest.text_tables import holds_tables, read_folder, read_text_table, tables_beside
 from headimpact_service.ingest.zip_guard import GuardedZip
 
+ALONE = frozenset({".parquet", ".feather", ".arrow", ".mat", ".xlsx", ".npz", ".json", ".ndjson", ".jsonl"})
+MAX_SHOWN = 100
 Impacts = Iterator[ImpactRecord | Problem]
 
 
@@ -75,7 +77,14 @@ def _read_zip(source: Source, options: ImportOptions) -> Impacts:
         if fits(names):
             yield from read_whole(source, options)
             return
+    if (alone := next(filter(_is_read_alone, names), None)) is not None:
+        raise Problem("unsupported-media-type", f"Of an archive, {alone[:MAX_SHOWN]} is not read: send it by itself.")
     raise Problem("unsupported-media-type", f"The zip archive holds none of the files that are read: {READ}.")
+
+
+def _is_read_alone(name: str) -> bool:
+    """Whether a file in an archive is one of those that are read by themselves."""
+    return PurePosixPath(name).suffix.lower() in ALONE
 
 
 READERS: dict[Kind, Callable[[Source, ImportOptions], Impacts]] = {

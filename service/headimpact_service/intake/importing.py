@@ -28,6 +28,8 @@ Found = Sequence[ImpactRecord | Problem]
 """Impacts as they were read, in the file's order; a fault of one stands in its place."""
 Known = list[tuple[ImpactRecord, DeviceFacts] | None]
 
+GAP = 1.5
+"""Steps of so many usual ones leave out a sample."""
 COUNTED = ("created", "unchanged", "failed")
 
 
@@ -140,7 +142,7 @@ def _as_sent(signal: Signal) -> dict[str, Any]:
         duration_s = (count - 1) / rate if rate else 0.0
     else:
         duration_s = float(signal.time_s[-1] - signal.time_s[0]) if count else 0.0
-        rate = (count - 1) / duration_s if duration_s else 0.0
+        rate = _rate(np.diff(signal.time_s), duration_s)
     return {
         "unit": signal.unit,
         "samples": count,
@@ -149,6 +151,14 @@ def _as_sent(signal: Signal) -> dict[str, Any]:
         "range": signal.declared_range,
         "peak": {axis: _peak(signal.values[:, column]) for column, axis in enumerate(AXES)},
     }
+
+
+def _rate(steps_s: FloatArray, duration_s: float) -> float:
+    """The rate of stamps: their mean or, where samples are missing, that between those that are there."""
+    usual = float(np.median(steps_s)) if steps_s.size else 0.0
+    if usual > 0.0 and steps_s.max() > GAP * usual:
+        return 1.0 / usual
+    return steps_s.size / duration_s if duration_s else 0.0
 
 
 def _peak(values: FloatArray) -> float | None:

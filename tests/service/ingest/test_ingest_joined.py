@@ -77,7 +77,9 @@ def test_a_sensors_own_rate_counts_beside_times_that_the_signals_share() -> None
     assert [signal.sample_rate_hz for _, signal in record.recording.signals()][1] == 2000.0
     [record] = records(generic(sample_rate_hz=["1000"] * 40), preset="generic_six_axis", mapping=own)
     assert [signal.sample_rate_hz for _, signal in record.recording.signals()] == [1000.0, 2000.0]
-    [problem] = read(generic(t_ms=times), preset="generic_six_axis", mapping=own, sample_rate_hz=1000.0)
+    [record] = records(generic(t_ms=times), preset="generic_six_axis", mapping=own, sample_rate_hz=1000.0)
+    assert [signal.sample_rate_hz for _, signal in record.recording.signals()] == [1000.0, 2000.0]
+    [problem] = read(generic(t_ms=times), preset="generic_six_axis", mapping=own, sample_rate_hz=2000.0)
     assert codes(problem) == [("sample_rate_hz", "rate-differs")]
     asked = Mapping.model_validate({"sample_rate_hz": 1000.5})
     [record] = records(generic(t_ms=times), preset="generic_six_axis", mapping=asked)

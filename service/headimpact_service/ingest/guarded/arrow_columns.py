@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import json
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any
@@ -16,7 +17,7 @@ from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, are_dated
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, stated, unreadable
 from headimpact_service.ingest.guarded.nested_columns import Batches, is_list, laid_out
 from headimpact_service.ingest.heading_rows import LOOK
-from headimpact_service.ingest.table import Columns, FloatArray
+from headimpact_service.ingest.table import DURATION, Columns, FloatArray
 
 MICROSECONDS = "us"
 UNIT_KEYS = (b"unit", b"units")
@@ -25,6 +26,8 @@ MAX_LIST = 20_001
 """Of a longer list this much is read: one sample more than an impact may have, which is then refused by name."""
 MAX_SAID = 100
 """Bytes of a value in a table's metadata that may be a rate: data frames keep a page of theirs there."""
+ATTRIBUTES = b"PANDAS_ATTRS"
+MAX_ATTRIBUTES = 64 * 1024
 _NO_TEXT = "A column that is to be read as text holds something else."
 _EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
 
@@ -62,7 +65,7 @@ class ArrowTable:
         self.dated: frozenset[int] = frozenset()
         self._elapsed = Elapsed()
         self.wordless = [place for place, kind in enumerate(self._types) if not is_told(kind)]
-        self.units = dict.fromkeys(self._samples(pa.types.is_duration), MICROSECONDS) | self.units
+        self.units |= dict.fromkeys(self._samples(pa.types.is_duration), DURATION)
         self.dated = frozenset({*self._samples(_is_instant), *self._written_times()})
 
     def _samples(self, is_kind: Callable[[pa.DataType], bool]) -> list[int]:
@@ -195,8 +198,20 @@ def _instant(microseconds: int, *, placed: bool) -> str:
 
 def _said_of_all(schema: pa.Schema) -> list[list[str]]:
     """What the file's metadata says of the table, as rows above its headings."""
-    short = islice(((key, value) for key, value in (schema.metadata or {}).items() if len(value) <= MAX_SAID), LOOK)
-    return [stated(part.decode("utf-8", "replace") for part in pair) for pair in short]
+    metadata = schema.metadata or {}
+    short = ((key, value) for key, value in metadata.items() if len(value) <= MAX_SAID and key != ATTRIBUTES)
+    pairs = [tuple(part.decode("utf-8", "replace") for part in pair) for pair in islice(short, LOOK)]
+    return [stated(pair) for pair in (*pairs, *islice(_attributes(metadata.get(ATTRIBUTES, b"{}")), LOOK))]
+
+
+def _attributes(text: bytes) -> Iterator[tuple[str, str]]:
+    """What a data frame says of itself: an object of JSON."""
+    try:
+        attributes = json.loads(text) if len(text) <= MAX_ATTRIBUTES else {}
+    except (ValueError, RecursionError):
+        return
+    if isinstance(attributes, dict):
+        yield from ((name, str(value)) for name, value in attributes.items() if isinstance(value, str | int | float))
 
 
 def _unit(field: pa.Field) -> str | None:

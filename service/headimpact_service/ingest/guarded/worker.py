@@ -147,7 +147,12 @@ def _block(block: Columns) -> Frame:
     numbers: list[Array] = [np.asarray(values, "<f8") for values in block.numbers.values()]
     texts = [Words.of(cells) for cells in block.texts.values()]
     places: list[Array] = [np.asarray(words.places, "<i4") for words in texts]
-    fields = {"rows": block.rows, "lengths": block.lengths, "words": [list(words.known) for words in texts]}
+    fields = {
+        "rows": block.rows,
+        "lengths": block.lengths,
+        "words": [list(words.known) for words in texts],
+        "joined": block.joined,
+    }
     return Frame("block", fields, [*numbers, *places])
 
 

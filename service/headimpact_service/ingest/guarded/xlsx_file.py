@@ -57,7 +57,7 @@ Row = list[Any]
 
 
 def contents(stream: BinaryIO) -> Iterator[Content]:
-    """Every worksheet that has headings with numbers below them."""
+    """Every worksheet that has headings with numbers below them; what a sheet of words before it says is said of it."""
     GuardedZip(stream)
     stream.seek(0)
     workbook = CalamineWorkbook.from_filelike(stream)
@@ -65,11 +65,14 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
     if len(names) > MAX_SHEETS:
         raise unreadable(f"A workbook may have at most {MAX_SHEETS} sheets.")
     found = False
+    beside: list[list[str]] = []
     for name in names:
         blocks, above = _blocks(workbook.get_sheet_by_name(name))
         if blocks:
             found = True
-            yield NamedTable(checked_text(name), SheetTable(blocks, above))
+            yield NamedTable(checked_text(name), SheetTable(blocks, [*beside, *above]))
+        else:
+            beside = (beside + above)[:LOOK]
     if not found:
         raise unreadable("No sheet of the workbook has headings with numbers below them.")
 
