@@ -11,6 +11,8 @@ from headimpact_service.errors import Problem
 
 JSON = "application/json"
 CSV = "text/csv"
+NEXT_CURSOR = "X-Next-Cursor"
+"""The header of a table that is a page."""
 NDJSON = "application/x-ndjson"
 PARQUET = "application/vnd.apache.parquet"
 HTML = "text/html"

@@ -18,7 +18,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from headimpact_service import __version__
-from headimpact_service.answers import JSON, PROBLEM_JSON
+from headimpact_service.answers import CSV, JSON, NEXT_CURSOR, PROBLEM_JSON
 from headimpact_service.errors import PROBLEMS
 from headimpact_service.operation import ANY_KEY, PUBLIC, Answer, BodyForm, Operation, OtherMethods, by_path
 from headimpact_service.problem_shapes import ProblemDocument
@@ -219,6 +219,9 @@ def _success(answer: Answer) -> dict[str, Any]:
             name: {"description": text, "required": True, "schema": {"type": "string"}}
             for name, text in answer.headers.items()
         }
+    if CSV in answer.media_types:
+        text = "Of a table with `limit`: the cursor of the next page, if there is one."
+        described.setdefault("headers", {})[NEXT_CURSOR] = {"description": text, "schema": {"type": "string"}}
     if answer.media_types:
         described["content"] = {
             media_type: {"schema": {"type": "object"} if media_type == JSON else {"type": "string"}}

@@ -75,8 +75,12 @@ _OF_PARAMETERS = {
 class ListQuery(Query):
     """What every list takes."""
 
-    limit: Annotated[PageSize, Field(description="Rows on a page.")] = 100
-    cursor: Annotated[str | None, Field(description="`next_cursor` of the page before, unchanged.")] = None
+    limit: Annotated[
+        PageSize, Field(description="Rows on a page. A table (CSV, NDJSON, Parquet) without it runs to the end.")
+    ] = 100
+    cursor: Annotated[
+        str | None, Field(description="`next_cursor` of the page before, or a table's `X-Next-Cursor`, unchanged.")
+    ] = None
 
 
 class SyncQuery(ListQuery):

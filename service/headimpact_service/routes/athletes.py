@@ -27,7 +27,7 @@ class AthleteBody(Strict):
     """What is known of an athlete; no name and no date of birth belong here. Null clears a field."""
 
     external_id: Name | None = Field(None, description="Your pseudonymous id.", examples=["p-17"])
-    tags: Annotated[list[Word], Field(max_length=50)] = Field([], examples=[["varsity"]])
+    tags: Annotated[list[Word], Field(max_length=50)] | None = Field(None, examples=[["varsity"]])
     sport: Word | None = Field(None, examples=["american_football"])
     level: Word | None = Field(None, examples=["collegiate"])
     position: Word | None = Field(None, examples=["LB"])
@@ -219,7 +219,7 @@ def _id(call: Call) -> bytes:
 
 
 def _stored(fields: dict[str, Any]) -> dict[str, Any]:
-    return fields | {"tags": tuple(fields["tags"])} if "tags" in fields else fields
+    return fields | {"tags": tuple(fields["tags"] or ())} if "tags" in fields else fields
 
 
 def document(athlete: Athlete) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from starlette.responses import Response
 from headimpact_service import deps
 from headimpact_service.answers import answer
 from headimpact_service.errors import Problem
-from headimpact_service.ingest.impact_json import Moment, Name, Strict, Text
+from headimpact_service.ingest.impact_json import Moment, Name, Strict
 from headimpact_service.operation import Answer, Call, Routes
 from headimpact_service.parameters import ListQuery
 from headimpact_service.routes.lists import MEDIA_TYPES, answer_list
@@ -26,7 +26,7 @@ routes = Routes("labels")
 class DiagnosisBody(Strict):
     """A concussion that was diagnosed after a session."""
 
-    session_id: Text = Field(description="The session that it came of.", examples=["2026-09-12-match"])
+    session_id: Name = Field(description="The session that it came of.", examples=["2026-09-12-match"])
     basis: Basis = "physician_diagnosis"
     diagnosed_at: Moment | None = Field(None, description="RFC 3339 with an offset.", examples=["2026-09-13T10:00:00Z"])
     diagnosed_by: Name | None = Field(

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from headimpact.criteria import CRITERION_KEYS
 from headimpact.errors import CalibrationError
 from headimpact_service.errors import PayloadError
-from headimpact_service.ingest.impact_json import CriterionKey, Incidence, Moment, Strict, Text, Word
+from headimpact_service.ingest.impact_json import CriterionKey, Incidence, Moment, Name, Strict, Text, Word
 from headimpact_service.ingest.json_faults import rules_problem
 from headimpact_service.intake.scoring import Terms
 
@@ -23,7 +23,7 @@ class CohortBody(Strict):
     occurred_to: Moment | None = Field(default=None, description="Before this time.")
     sport: Text | None = None
     activity: Text | None = None
-    session_id: Text | None = None
+    session_id: Name | None = None
     device_serial: Text | None = None
     athlete_level: Word | None = None
     athlete_sex: Literal["male", "female", "other"] | None = None

@@ -149,6 +149,8 @@ class ImpactQuery(SyncQuery):
 async def list_impacts(call: Call) -> Response:
     """With `updated_since` in the order of change, deleted impacts as tombstones.
 
+    Filters see what impacts are now: one that moved to another athlete leaves the first one's list without a tombstone.
+
     What labels say (`outcome`, in tables `event` too) is shown to keys with the scope `labels:read`.
 
     With `include=traces`, NDJSON holds an impact a line as `POST /v1/imports` takes it, CSV and Parquet a sample a row.

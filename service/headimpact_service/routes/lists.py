@@ -10,7 +10,7 @@ from anyio.to_thread import run_sync
 from starlette.responses import Response, StreamingResponse
 
 from headimpact_service import deps
-from headimpact_service.answers import CSV, JSON, NDJSON, PARQUET, answer
+from headimpact_service.answers import CSV, JSON, NDJSON, NEXT_CURSOR, PARQUET, answer
 from headimpact_service.operation import Call
 from headimpact_service.parameters import ListQuery
 from headimpact_service.routes.tables import Cell, Form, Kind, table_form
@@ -23,7 +23,6 @@ MEDIA_TYPES = (JSON, CSV, NDJSON, PARQUET)
 PAGE_OF_TABLE = 1000
 """Rows that a table reads at a time, so that no reader holds the database for long."""
 
-NEXT_CURSOR = "X-Next-Cursor"
 _INTEGERS = frozenset({"revision", "birth_year", "done", "total", "number", "drop_rows"})
 _INSTANTS = ("_at", "_due", "_fired")
 """How the names of columns of times end, of every list."""

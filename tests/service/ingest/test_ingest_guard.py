@@ -310,8 +310,12 @@ TABLE = wire.Frame(
     [
         wire.Frame("block", {"rows": 3, "lengths": [3], "joined": False, "words": []}, [np.zeros(2)]),
         wire.Frame("block", {"rows": 3, "lengths": [4], "joined": False, "words": []}, [np.zeros(3)]),
-        wire.Frame("block", {"rows": 3, "lengths": [3], "joined": False, "words": [["x"]]}, [np.zeros(3), np.ones(1, "<i4")]),
-        wire.Frame("block", {"rows": 3, "lengths": [3], "joined": False, "words": [["x"]]}, [np.zeros(3), -np.ones(1, "<i4")]),
+        wire.Frame(
+            "block", {"rows": 3, "lengths": [3], "joined": False, "words": [["x"]]}, [np.zeros(3), np.ones(1, "<i4")]
+        ),
+        wire.Frame(
+            "block", {"rows": 3, "lengths": [3], "joined": False, "words": [["x"]]}, [np.zeros(3), -np.ones(1, "<i4")]
+        ),
         wire.Frame("block", {"rows": "three", "lengths": [3], "joined": False, "words": []}, [np.zeros(3)]),
         wire.Frame("block", {"rows": 3, "lengths": [4, -1], "words": []}, [np.zeros(3)]),
         wire.Frame("block", {}, []),
