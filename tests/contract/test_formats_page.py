@@ -10,7 +10,7 @@ from headimpact_service.ingest.impact_json import Context
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.presets import presets
 from headimpact_service.intake.exporting import SAMPLE_COLUMNS
-from headimpact_service.routes.impact_parts import COLUMNS
+from headimpact_service.routes.impact_shapes import COLUMNS
 from headimpact_service.store.tables import CRITERION_COLUMNS
 
 PAGE = "docs/formats.md"
