@@ -18,7 +18,7 @@ from headimpact_service.ingest.mapping import TIME_UNITS
 from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows, go_on_alike, rounded_to
+from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows, go_on_alike, rounded_to, with_gaps
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import Track
 from headimpact_service.ingest.windows import Rows, numbers_of
@@ -39,8 +39,8 @@ class ImpactTimes:
         self.samples, self.layout, self.rows, self.row = samples, samples.layout, rows, row
         self._kept_stamps: dict[tuple[int, ...], FloatArray] = {}
 
-    def track(self, name: SignalName, rows: Rows, reading: Reading) -> Track:
-        """A signal's rows with the rate or the stamps that count for them."""
+    def track(self, name: SignalName, rows: Rows, reading: Reading, *, fill_gaps: bool) -> Track:
+        """A signal's rows with the rate or the stamps that count for them; with gaps if these are to be filled."""
         signal = self.layout.signals[name]
         clock = signal.clock or self.clock
         if self.layout.ends_alone(name) or self.samples.has_ends:
@@ -50,7 +50,11 @@ class ImpactTimes:
             return self._counted(Track(name, rows, rate or self.mapping.sample_rate_hz, None, 1.0))
         stamps = self._stamps(clock.column, rows)
         if rate is not None and (signal.clock is not None or not signal.is_apart):
-            _require_on_time(stamps * clock.milliseconds, rate)
+            stamps_ms = stamps * clock.milliseconds
+            placed = with_gaps(stamps_ms, rate) if fill_gaps and not follows(stamps_ms, rate) else None
+            if placed is not None:
+                return Track(name, rows, None, placed, 1.0, clock.dated)
+            _require_on_time(stamps_ms, rate)
         return Track(name, rows, rate, stamps, clock.milliseconds, clock.dated)
 
     def _said_rate(self, name: SignalName, signal: SignalLayout, reading: Reading) -> float | None:

@@ -17,6 +17,7 @@ ROUNDED_TO_MS = (1.0, 0.1, 0.01)
 """What stamps are written to."""
 NEAR, DRIFT = 0.6, 0.005
 """How far a stamp may be from where a stated rate has its sample: in samples, and by what went by since the first."""
+MOST_MISSING: int = QUALITY_LIMITS["gaps"]["maximum_samples"]
 SURE = 4.0
 """Standard errors of a rate that stamps say."""
 SAME_RATE: float = QUALITY_LIMITS["record"]["same_rate"]
@@ -66,6 +67,19 @@ def follows(stamps_ms: FloatArray, rate_hz: float, *, drift: float = DRIFT) -> b
     uneven = np.abs(np.diff(stamps_ms) - step)  # by a sample that is left out, wherever it is
     is_near = bool((stray <= near + drift * elapsed).all() and (uneven <= near + drift * step).all())
     return is_near and _steps_by(stamps_ms, step, drift)
+
+
+def with_gaps(stamps_ms: FloatArray, rate_hz: float) -> FloatArray | None:
+    """The times [ms] that samples of a rate have whose stamps are rounded and leave some out; None if they are not."""
+    if stamps_ms.size < 2 or not np.isfinite(stamps_ms).all():
+        return None
+    step = 1000.0 / rate_hz
+    places = np.rint((stamps_ms - stamps_ms[0]) / step)
+    steps = np.diff(places)
+    if not ((steps >= 1.0) & (steps <= 1.0 + MOST_MISSING)).all():
+        return None
+    filled = np.interp(np.arange(places[-1] + 1.0), places, stamps_ms)
+    return stamps_ms[0] + places * step if follows(filled, rate_hz) else None
 
 
 def _rounding(stamps_ms: FloatArray, step_ms: float) -> float:

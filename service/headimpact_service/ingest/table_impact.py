@@ -131,7 +131,7 @@ class TableImpact:
         fill_gaps = options.fill_gaps or reading.fill_gaps or bool(mapping.fill_gaps)
         self.times.require_counted(allow_gaps=fill_gaps)
         self.notes += self.times.other_origins()
-        tracks = self._tracks()
+        tracks = self._tracks(fill_gaps=fill_gaps)
         for track in tracks:
             self.times.require_going_on(track, self.labels.parting)
         self.times.require_no_other(tracks, self.labels)
@@ -175,17 +175,17 @@ class TableImpact:
         """Where the signals were measured, as the row says or else the mapping."""
         return self.reading.location or self.mapping.location
 
-    def _tracks(self) -> list[Track]:
+    def _tracks(self, *, fill_gaps: bool) -> list[Track]:
         """The rows of each signal: all of the impact's, unless these are parted by time base."""
         if self.layout.time_base is None:
-            whole = [self.times.track(name, self.rows, self.reading) for name in self._present()]
+            whole = [self.times.track(name, self.rows, self.reading, fill_gaps=fill_gaps) for name in self._present()]
             self._note_end(whole)
             return whole
         tracks: list[Track] = []
         for rows in self._parts(self.layout.time_base):
             reading = self._reading_at(rows.start if isinstance(rows, slice) else rows[0])
             tracks += [
-                self.times.track(name, rows, reading)
+                self.times.track(name, rows, reading, fill_gaps=fill_gaps)
                 for name, values in self.samples.signals.items()
                 if not np.isnan(values[rows]).all()
             ]

@@ -12,6 +12,7 @@ from binary_files import COLUMNS, npz, pa, parquet
 from ingest_files import GENERIC, codes, one, outcome, read, refused, six_axis
 from making import table
 
+from headimpact.preparation import prepare
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 
@@ -382,3 +383,25 @@ def test_times_that_go_through_zero_at_another_time_than_the_trigger_are_noted(s
     record = one(table(["t_ms", *SIX], rows), mapping=Mapping.model_validate({"pre_trigger_ms": said}))
     assert record.recording.pre_trigger_ms == said
     assert [note.code for note in record.notes] == ["time_origin_mismatch"] * noted
+
+
+@pytest.mark.parametrize(("rate_hz", "digits"), [(1600.0, 1), (3200.0, 1), (1000.0, 0), (1666.0, 1)])
+@pytest.mark.parametrize("missing", [(30,), (30, 31), (30, 60)])
+def test_a_gap_among_rounded_stamps_beside_a_rate_is_filled_where_that_is_asked(rate_hz, digits, missing):
+    kept = [n for n in range(100) if n not in missing]
+    samples = six_axis(100)
+    rows = [f"{round(n * 1000.0 / rate_hz, digits)},{','.join(map(repr, samples[n].tolist()))}" for n in kept]
+    text = "\n".join(["t_ms,ax_g,ay_g,az_g,wx_rad_s,wy_rad_s,wz_rad_s", *rows])
+    assert codes(refused(text, sample_rate_hz=rate_hz)) == [("sample_rate_hz", "rate-differs")]
+    found = prepare(one(text, sample_rate_hz=rate_hz, fill_gaps=True).recording)
+    assert found.motion.samples == 100
+    assert found.motion.sample_rate_hz == pytest.approx(rate_hz, rel=1e-9)
+    assert {note.code for note in found.notes} >= {"gaps_filled"}
+
+
+def test_a_longer_gap_among_rounded_stamps_is_refused_as_before():
+    kept = [n for n in range(100) if n not in range(30, 33)]
+    samples = six_axis(100)
+    rows = [f"{round(n / 1.6, 1)},{','.join(map(repr, samples[n].tolist()))}" for n in kept]
+    text = "\n".join(["t_ms,ax_g,ay_g,az_g,wx_rad_s,wy_rad_s,wz_rad_s", *rows])
+    assert codes(refused(text, sample_rate_hz=1600.0, fill_gaps=True)) == [("sample_rate_hz", "rate-differs")]
