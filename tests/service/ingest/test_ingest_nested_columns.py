@@ -169,3 +169,16 @@ def test_times_of_any_type_are_those_of_samples(kind: pa.DataType):
             assert isinstance(record, ImpactRecord), record.as_dict()
             for _, signal in record.recording.signals():
                 assert signal.sample_rate_hz == 500.0
+
+
+@pytest.mark.parametrize("name", ["context", "meta", "Metadata", "info"])
+def test_facts_in_a_struct_are_called_by_their_own_names(name: str):
+    facts = [
+        {"session_id": f"s-{n}", "athlete": f"p-{n}", "sample_rate_hz": 2000.0, "external_id": "x"} for n in range(3)
+    ]
+    found = read(parquet(pa.table(of_impacts(np.ndarray.tolist) | {name: facts})))
+    for number, record in enumerate(found):
+        assert isinstance(record, ImpactRecord)
+        assert record.context == {"session_id": f"s-{number}"}
+        assert (record.external_id, record.athlete_external_id) == (f"i{number}", f"p-{number}")
+        assert [signal.sample_rate_hz for _, signal in record.recording.signals()] == [2000.0, 2000.0]

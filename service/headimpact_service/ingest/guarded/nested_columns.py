@@ -24,6 +24,8 @@ MAX_DEPTH = 4
 MAX_WIDTH = 16
 """Components of one sample: six axes, perhaps with their resultants."""
 VECTORS = {3, 6}
+FACTS = frozenset({"context", "meta", "metadata", "info", "reading"})
+"""Structs of what is said of an impact: their fields are called by their own names, which no other column has."""
 FIRST_ROWS = 8
 """Rows by which lists are told to be vectors: a table of fewer impacts may have lists of any length."""
 
@@ -46,6 +48,8 @@ class _Leaf:
     field: pa.Field
     column: int
     steps: tuple[_Step, ...] = ()
+    taken: frozenset[str] = frozenset()
+    """Names that other columns of the file have."""
 
 
 def laid_out(schema: pa.Schema, batches: Batches) -> tuple[pa.Schema, Batches]:
@@ -55,9 +59,10 @@ def laid_out(schema: pa.Schema, batches: Batches) -> tuple[pa.Schema, Batches]:
     if not nested and not widths:
         return schema, batches
     first = _first_row(batches, nested)
+    taken_names = frozenset(schema.names)
     leaves: list[_Leaf] = []
     for place, field in enumerate(schema):
-        whole = _Leaf(field, place)
+        whole = _Leaf(field, place, taken=taken_names)
         width = widths.get(place)
         parts = (
             _leaves(whole, first.get(place)) if width is None else _vector(whole, field.type.value_type, width, "part")
@@ -161,8 +166,10 @@ def _vector(leaf: _Leaf, kind: pa.DataType, width: int, within: Within) -> Itera
 
 def _below(leaf: _Leaf, name: str, field: pa.Field, step: _Step) -> _Leaf:
     """A part of a column, with that one's metadata, its unit, where it has none of its own."""
-    named = pa.field(f"{leaf.field.name}_{name}", field.type, metadata=field.metadata or leaf.field.metadata)
-    return _Leaf(named, leaf.column, (*leaf.steps, step))
+    is_fact = not leaf.steps and leaf.field.name.lower() in FACTS and name not in leaf.taken
+    called = name if is_fact else f"{leaf.field.name}_{name}"
+    named = pa.field(called, field.type, metadata=field.metadata or leaf.field.metadata)
+    return _Leaf(named, leaf.column, (*leaf.steps, step), leaf.taken)
 
 
 def _listed(field: pa.Field) -> pa.Field:
