@@ -427,6 +427,21 @@ def test_units_that_arrays_state_are_held_against_the_preset():
     assert [signal.unit for _, signal in first.recording.signals()] == ["g", "deg/s"]
 
 
+@pytest.mark.parametrize("name", ["units", "unit"])
+def test_units_may_stand_in_a_struct_by_the_names_of_their_arrays(name: str):
+    values = noise(1, 100)[0]
+    columns = {
+        signal: {axis: f"{array}_{axis}" for axis in "xyz"}
+        for signal, array in (("linear_acceleration", "acc"), ("angular_velocity", "gyro"))
+    }
+    mapping = Mapping.model_validate(columns | {"sample_rate_hz": 1000})
+    arrays = {"acc": values[:, :3], "gyro": values[:, 3:], name: {"acc": "m/s^2", "gyro": "deg/s"}}
+    [one] = records(mat(arrays), mapping=mapping)
+    assert [signal.unit for _, signal in one.recording.signals()] == ["m/s^2", "deg/s"]
+    [one] = records(mat({"impact": structs(arrays)}), mapping=mapping)
+    assert [signal.unit for _, signal in one.recording.signals()] == ["m/s^2", "deg/s"]
+
+
 @pytest.mark.parametrize("behind", [b"\0" * 100, b"x" * 100, bytes(range(1, 101))])
 def test_what_stands_behind_the_variables_is_named(behind: bytes):
     problem = refused(mat({"hit": noise(1, 100)[0]}) + behind, preset=PRESET)

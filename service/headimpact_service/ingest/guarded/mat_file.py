@@ -64,12 +64,16 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
 def _with_facts(variables: dict[str, Any]) -> dict[str, Any]:
     """The variables, where some are arrays of samples, with the fields of structs that hold none in their place.
 
-    Such a struct says something of all of them: a rate, the athlete.
+    Such a struct says something of all of them: a rate, the athlete, or by their names the units.
     """
     if not any(isinstance(value, np.ndarray) and _is_long(value) for value in variables.values()):
         return variables
     told = {name: value for name, value in variables.items() if _is_struct(value) and not _holds_long(value)}
-    facts = [_flat(struct.reshape(-1)[0]) for struct in told.values() if struct.size == 1]
+    facts = [
+        _flat(struct.reshape(-1)[0], "" if unit_of(name) is None else f"{name}_")
+        for name, struct in told.items()
+        if struct.size == 1
+    ]
     rest = {name: value for name, value in variables.items() if name not in told}
     return {name: fact for fields in facts for name, fact in fields.items()} | rest
 
