@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from datetime import datetime
 from functools import cached_property
 from itertools import groupby
 from typing import Any
@@ -14,21 +13,15 @@ import numpy as np
 from headimpact.cut_offs import PAPER
 from headimpact.quality import QualityNote, check_reported_peak, check_reported_resultant
 from headimpact.recording import Mounting, Recording, Signal, SignalName
-from headimpact_service.errors import Problem
 from headimpact_service.ingest.cells import said
-from headimpact_service.ingest.conventions import require_axes, require_units
-from headimpact_service.ingest.facts_beside import FactsAbove, moment_said
 from headimpact_service.ingest.file_faults import file_fault
-from headimpact_service.ingest.formula_cells import name_in, unguarded, unguarded_name
-from headimpact_service.ingest.impact_json import MAX_NAME, MAX_SAMPLES
+from headimpact_service.ingest.impact_facts import ImpactFacts
+from headimpact_service.ingest.impact_json import MAX_SAMPLES
 from headimpact_service.ingest.impact_reading import low_pass, mounting
 from headimpact_service.ingest.impact_times import ImpactTimes
 from headimpact_service.ingest.labels import (
     NOTHING_SAID,
     Reading,
-    checked_name,
-    context_of,
-    moment,
     reading_of,
     says_rate,
 )
@@ -36,12 +29,10 @@ from headimpact_service.ingest.plan import Plan
 from headimpact_service.ingest.record import ImpactRecord
 from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
-from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.supplied import peak_said
 from headimpact_service.ingest.table import FloatArray
 from headimpact_service.ingest.tracks import TimeBase, Track, time_bases
 from headimpact_service.ingest.windows import Rows, numbers_of
-from headimpact_service.store import ids
 
 
 class TableImpact:
@@ -59,28 +50,26 @@ class TableImpact:
         self.cell = first if window.columns.lengths is None else number
         alike = samples.are_alike(self.rows)
         self.labels = RowLabels(self.layout, samples.texts, self.rows, self.cell, self.row, alike)
+        self.facts = ImpactFacts(plan, self.layout, self.labels, parted=window.columns.lengths is not None)
         self.times = ImpactTimes(plan, samples, self.rows, self.row)
         self.notes: list[QualityNote] = list(samples.layout.notes)
 
     def record(self) -> ImpactRecord:
         """The impact, with what the sender gave beside the file in place of what the file says."""
-        options, named = self.options, self.plan.named
-        self.labels.require_one_impact(options.time_zone)
-        self._require_conventions()
-        unscorable = self._text(self.layout.unscorable)
+        self.labels.require_one_impact(self.options.time_zone)
+        self.facts.require_conventions()
+        unscorable = self.facts.unscorable
         recording = self._recording(scorable=unscorable is None)
-        above = self._above()
-        athlete = options.athlete or self._name("athlete", self.layout.athlete) or above.athlete
-        by_id = options.athlete is None and self._is_our_id(athlete)
+        athlete_id, athlete = self.facts.athlete()
         return ImpactRecord(
             recording=recording,
-            external_id=self._name("external_id", self.layout.external_id) or named.external_id,
-            athlete_id=athlete if by_id else None,
-            athlete_external_id=None if by_id else athlete,
-            occurred_at=options.occurred_at or self._occurred_at() or above.occurred_at or named.occurred_at,
-            device_serial=options.device or self._name("device", self.layout.device) or above.device or named.device,
-            context=self._context(),
-            metadata=self._metadata(),
+            external_id=self.facts.external_id(),
+            athlete_id=athlete_id,
+            athlete_external_id=athlete,
+            occurred_at=self.facts.occurred_at(),
+            device_serial=self.facts.device(),
+            context=self.facts.context(),
+            metadata=self.facts.metadata(),
             notes=tuple(self.notes),
             unscorable=() if unscorable is None else (unscorable,),
             left_out=tuple(
@@ -88,23 +77,6 @@ class TableImpact:
             ),
             needs_device_mounting=self._location == "sensor" and recording.mounting is None,
         )
-
-    def _require_conventions(self) -> None:
-        """Refuse columns that say other axes or units than those that are read."""
-        layout = self.layout
-        for column in layout.conventions.axes:
-            require_axes(layout.named(column), self.labels.said(column))
-        units = {name: signal.unit for name, signal in layout.signals.items()}
-        for column in layout.conventions.units:
-            for text in self.labels.all_said(column):
-                require_units(layout.named(column), text, units)
-
-    def sent_name(self) -> str | None:
-        """What the file calls the impact."""
-        try:
-            return self._name("external_id", self.layout.external_id) or self.plan.named.external_id
-        except Problem:
-            return None
 
     @cached_property
     def reading(self) -> Reading:
@@ -257,69 +229,3 @@ class TableImpact:
             peak = peak_said(self.labels.all_said(one.column))
             if peak is not None:
                 self.notes += check_reported_peak(track.name, layout.unit, peak * one.factor, values)
-
-    def _text(self, column: int | None) -> str | None:
-        if column is None:
-            return None
-        text = self.labels.said(column)
-        return (unguarded(text) if self.plan.format == "csv" else unguarded_name(text)) or None
-
-    def _named(self, column: int | None) -> str | None:
-        if column is None:
-            return None
-        return name_in(self.labels.said(column), typed=self.plan.format != "csv") or None
-
-    def _name(self, field: str, column: int | None) -> str | None:
-        return checked_name(self._named(column), field)
-
-    def _is_our_id(self, athlete: str | None) -> bool:
-        """Whether an athlete is given by our id, as this service's own lists have it: in a column athlete_id."""
-        column = self.layout.athlete
-        if athlete is None or column is None or compact(self.layout.headings[column]) != "athleteid":
-            return False
-        return ids.decode("ath", athlete) is not None
-
-    def _context(self) -> dict[str, Any]:
-        read = {"session_id": self._named}
-        cells = ((field, read.get(field, self._text)(column)) for field, column in self.layout.context.items())
-        texts = tuple((field, text) for field, text in cells if text is not None)
-        return dict(context_of(texts)) if texts else {}
-
-    def _above(self) -> FactsAbove:
-        """What rows above the headings say of the impact, as far as no column is for it."""
-        above, layout = self.plan.above, self.layout
-        several = layout.keys or self.samples.window.columns.lengths is not None
-        return FactsAbove(
-            athlete=None if layout.athlete is not None else checked_name(above.athlete, "athlete"),
-            device=None if layout.device is not None else checked_name(above.device, "device"),
-            occurred_at=None if layout.occurred_at or several else above.occurred_at,
-        )
-
-    def _when(self) -> datetime | None:
-        """When the impact was, as columns say that no field is for, if all its rows say one time."""
-        for columns in self.layout.events:
-            told = [self.labels.all_said(column) for column in columns]
-            if all(len(texts) == 1 for texts in told) and (
-                when := moment_said([text for (text,) in told], self.options.time_zone)
-            ):
-                return when
-        return None
-
-    def _occurred_at(self) -> datetime | None:
-        columns = self.layout.occurred_at
-        if self.options.occurred_at is not None:
-            return None
-        if not columns:
-            return self._when()
-        parts = {self.layout.headings[column]: self._text(column) for column in columns}
-        return moment(parts, self.options.time_zone, self.layout.date_order)
-
-    def _metadata(self) -> dict[str, Any]:
-        told = {"format": self.plan.format, "preset": self.plan.preset, "file": self.options.filename}
-        keys = [self._named(column) for column in self.layout.keys if column != self.layout.external_id]
-        return {name: value for name, value in told.items() if value is not None} | self._told_apart(keys)
-
-    def _told_apart(self, keys: list[str | None]) -> dict[str, Any]:
-        """What the file itself calls the impact, where that is no name outside it."""
-        known = [key for key in keys if key is not None]
-        return {"impact": " ".join(known)[:MAX_NAME]} if known else {}

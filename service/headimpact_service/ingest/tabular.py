@@ -114,7 +114,7 @@ def _read_window(plan: Plan, layout: Layout, window: Window) -> Iterator[ImpactR
         try:
             yield impact.record()
         except Problem as problem:
-            yield RefusedImpact(problem, impact.sent_name())
+            yield RefusedImpact(problem, impact.facts.sent_name())
 
 
 def _plan(headings: Headings, options: ImportOptions, format_name: str) -> Plan:
