@@ -25,7 +25,8 @@ def with_other_times(layout: Layout, headings: Headings, table: Table, *, rates:
     others = other_times(headings, read, table, times_of(headings))
     if not rates:
         return replace(layout, others=replace(others, rates=()))
-    return replace(layout, others=replace(others, stated=tuple(rates_stated(table.above))))
+    stated = (*rates_stated(table.above, sentences=True), *rates_stated(table.beside, sentences=False))
+    return replace(layout, others=replace(others, stated=stated))
 
 
 def with_supplied(layout: Layout, headings: Headings, table: Table) -> Layout:

@@ -14,7 +14,7 @@ from headimpact_service.ingest.lines_above import are_sae, speaks_of_axes
 from headimpact_service.ingest.spelling import compact, unit_spelled
 
 _OF_UNITS = frozenset({"unit", "units", "einheit", "einheiten", "unite", "unites"})
-_PARTED = re.compile(r"\s*[,;|]\s*")
+_PARTED = re.compile(r"[,;|+\s]+|_(?=rad|deg)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,13 @@ def conventions(headings: Headings, passed: Collection[int], *, axes: bool, unit
     open_to_all = [column for column in range(len(headings.written)) if column not in passed]
     return Conventions(
         tuple(column for column in open_to_all if axes and speaks_of_axes(headings.written[column])),
-        tuple(column for column in open_to_all if units and compact(headings.written[column]) in _OF_UNITS),
+        tuple(column for column in open_to_all if units and _speaks_of_units(headings, column, passed)),
     )
+
+
+def _speaks_of_units(headings: Headings, column: int, read: Collection[int]) -> bool:
+    """Whether a column says units of what is read: one behind a column that is not may be of that."""
+    return compact(headings.written[column]) in _OF_UNITS and (column == 0 or column - 1 in read)
 
 
 def require_axes(column: str, text: str) -> None:

@@ -70,6 +70,7 @@ class CsvTable:
 
     parted = False
     wordless = frozenset[int]()
+    beside: Sequence[Sequence[str]] = ()
 
     def __init__(self, stream: BinaryIO, *, skip_rows: int = 0) -> None:
         """Look through the file, then read as far as the headings; 422 where there are none."""

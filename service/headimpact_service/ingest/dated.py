@@ -24,8 +24,8 @@ _CLOCK = re.compile(
 """A time of day, with a date or without, or one that has passed, with its days; without hours, minutes and seconds as a
 spreadsheet shows them."""
 _FRACTION = re.compile(r":[0-9]{2}(?:[.,][0-9]|:[0-9]{3})", re.ASCII)
-_DAY_S = 86_400
-_NIGHT_S = 23 * 3600
+DAY_S = 86_400
+NIGHT_S = 23 * 3600
 """What a clock without a date falls by at midnight, at least."""
 MAX_DAYS = 4000
 """Of one file: eleven years of them."""
@@ -83,7 +83,7 @@ class Elapsed:
         if len(self._days) > MAX_DAYS:
             return None
         parts = found["parts"] or found["thousandths"] or ""
-        return (self._day(found, seconds) * _DAY_S + seconds) * 10**9 + int(parts.ljust(9, "0"))
+        return (self._day(found, seconds) * DAY_S + seconds) * 10**9 + int(parts.ljust(9, "0"))
 
     def _day(self, found: re.Match[str], seconds: int) -> int:
         """Which day a time is of: the one that is written or, without any, the one that midnights have led to."""
@@ -92,7 +92,7 @@ class Elapsed:
         if found["date"] is not None:
             return self._days.setdefault(found["date"], len(self._days))
         step, self._last_s = seconds - self._last_s, seconds
-        self._midnights += (step < -_NIGHT_S) - (step > _NIGHT_S)
+        self._midnights += (step < -NIGHT_S) - (step > NIGHT_S)
         return self._midnights
 
 

@@ -252,6 +252,7 @@ class _Channels:
     dated = frozenset[int]()
     wordless = frozenset[int]()
     above: Sequence[Sequence[str]] = ()
+    beside: Sequence[Sequence[str]] = ()
 
     def __init__(self, data: _Data) -> None:
         """Headings are the channels' codes or, where they have none, their names."""

@@ -5,10 +5,10 @@ They are read where they can be read surely, and left alone otherwise: nobody ha
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
 
 from headimpact_service.ingest.cells import said
 from headimpact_service.ingest.date_order import year_first
@@ -17,15 +17,15 @@ from headimpact_service.ingest.lines_above import Rows, facts_stated
 from headimpact_service.ingest.spelling import compact
 from headimpact_service.ingest.times import TimeError, instant
 
-Field = Literal["athlete", "device", "occurred_at"]
-_EVENTS = ("eventtime", "impacttime", "hittime", "eventtimestamp", "impacttimestamp", "timestamp", "datetime")
+_EVENTS = ("eventtime", "impacttime", "hittime", "eventtimestamp", "impacttimestamp")
+_STAMPS = ("timestamp", "datetime")
 _EVENT_DATES, _EVENT_TIMES = ("date", "eventdate", "impactdate"), ("time", "eventtime", "impacttime", "timeofday")
-_ABOVE: Mapping[Field, tuple[str, ...]] = {
-    "athlete": ("athlete", "athleteid", "player", "playerid", "subjectid", "playername", "athletename"),
-    "device": ("deviceid", "deviceserial", "deviceserialnumber", "serialnumber", "sensorid", "mouthguardid"),
-    "occurred_at": ("occurredat", *_EVENTS),
-}
-"""Rows' names; a lone `device` above a table may as well be its make."""
+_ATHLETES = ("athleteid", "playerid", "subjectid", "athlete", "player", "playername", "athletename")
+_DEVICES = ("deviceid", "deviceserial", "deviceserialnumber", "serialnumber", "sensorid", "mouthguardid")
+"""Of rows above a table; a lone `device` there may as well be its make, and a lone date that of an export."""
+_SEVERAL = re.compile(r"[;|].*[:=]")
+_NOBODY = ""
+"""What stands beside the values of a row that says more than one thing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,20 +41,23 @@ NOTHING_ABOVE = FactsAbove()
 
 
 def facts_above(rows: Rows, time_zone: str | None) -> FactsAbove:
-    """The facts of rows: of each the first that is named so and says something."""
-    told: dict[str, str] = {}
+    """The facts of rows that are a name and one value; of a name that says two, none."""
+    told: dict[str, set[str]] = {}
     for name, cells in facts_stated(rows):
-        text = next(filter(None, map(said, cells)), "")
-        if text:
-            told.setdefault(compact(name), text)
-    dates = ([told.get(date, ""), told.get(time, "")] for date in _EVENT_DATES for time in _EVENT_TIMES)
-    whole = [[told[name]] for name in _ABOVE["occurred_at"] if name in told]
-    moments = (moment_said(parts, time_zone) for parts in (*whole, *filter(all, dates)))
+        values = list(filter(None, map(said, cells)))
+        several = len(values) > 1 or any(map(_SEVERAL.search, values))
+        told.setdefault(compact(name), set()).update([*values, _NOBODY] if several else values)
+    when = _first(told, ("occurredat", *_EVENTS))
     return FactsAbove(
-        athlete=next((told[name] for name in _ABOVE["athlete"] if name in told), None),
-        device=next((told[name] for name in _ABOVE["device"] if name in told), None),
-        occurred_at=next(filter(None, moments), None),
+        athlete=_first(told, _ATHLETES),
+        device=_first(told, _DEVICES),
+        occurred_at=None if when is None else moment_said([when], time_zone),
     )
+
+
+def _first(told: Mapping[str, set[str]], names: Sequence[str]) -> str | None:
+    """What the first of some names says that says one thing."""
+    return next((next(iter(told[name])) for name in names if len(told.get(name, ())) == 1), None)
 
 
 def event_columns(headings: Headings, passed: Collection[int]) -> tuple[tuple[int, ...], ...]:
@@ -64,7 +67,7 @@ def event_columns(headings: Headings, passed: Collection[int]) -> tuple[tuple[in
 
 
 def _events(places: Mapping[str, int]) -> Iterator[tuple[int, ...]]:
-    yield from ((places[name],) for name in _EVENTS if name in places)
+    yield from ((places[name],) for name in (*_EVENTS, *_STAMPS) if name in places)
     for date in _EVENT_DATES:
         yield from ((places[date], places[time]) for time in _EVENT_TIMES if date in places and time in places)
 

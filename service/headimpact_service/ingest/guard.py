@@ -115,6 +115,7 @@ class GuardedTable:
         self.headings = tuple(str(heading) for heading in fields.fields["headings"])
         self.units = {int(column): str(unit) for column, unit in fields.fields["units"].items()}
         self.above: Sequence[Sequence[str]] = [list(map(str, row)) for row in fields.fields["above"]]
+        self.beside: Sequence[Sequence[str]] = [list(map(str, row)) for row in fields.fields["beside"]]
         self.dated = frozenset(map(int, fields.fields["dated"]))
         self.parted = bool(fields.fields["parted"])
         self.wordless = frozenset(map(int, fields.fields["wordless"]))

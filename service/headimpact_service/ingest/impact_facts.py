@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any
+from typing import Any, Literal
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.conventions import require_axes, require_units
@@ -54,7 +54,7 @@ class ImpactFacts:
         if self._options.athlete is not None:
             return None, self._options.athlete
         if column is None:
-            return None, checked_name(self._plan.above.athlete, "athlete")
+            return None, self._above("athlete", self._plan.above.athlete)
         name = self._name("athlete", column)
         return (name, None) if self._is_our_id(name, column) else (None, name)
 
@@ -62,9 +62,9 @@ class ImpactFacts:
         """The serial number of the device."""
         if self._options.device is not None:
             return self._options.device
-        column, above = self._layout.device, self._plan.above.device
-        said = checked_name(above, "device") if column is None else self._name("device", column)
-        return said or self._plan.named.device
+        column = self._layout.device
+        above = self._above("device", self._plan.above.device)
+        return (above if column is None else self._name("device", column)) or self._plan.named.device
 
     def occurred_at(self) -> datetime | None:
         """When it was."""
@@ -107,6 +107,14 @@ class ImpactFacts:
         if any(len(texts) != 1 for texts in told):
             return None
         return moment_said([text for (text,) in told], self._options.time_zone)
+
+    def _above(self, field: Literal["athlete", "device"], text: str | None) -> str | None:
+        """A name in a row above the headings, unless the sender's mapping reads none."""
+        sent = self._options.mapping
+        unread = sent is not None and field in sent.model_fields_set
+        if text is None or unread:
+            return None
+        return checked_name(name_in(text, typed=self._plan.format != "csv") or None, field)
 
     def _is_our_id(self, athlete: str | None, column: int) -> bool:
         """Whether an athlete is given by our id, as this service's own lists have it: in a column athlete_id."""

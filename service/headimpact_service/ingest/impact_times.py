@@ -20,6 +20,7 @@ from headimpact_service.ingest.row_labels import RowLabels
 from headimpact_service.ingest.samples import Samples
 from headimpact_service.ingest.stamps import DRIFT, agree, before_zero_ms, follows, go_on_alike, rounded_to, with_gaps
 from headimpact_service.ingest.table import FloatArray
+from headimpact_service.ingest.time_headings import LEAST_HZ
 from headimpact_service.ingest.tracks import Track
 from headimpact_service.ingest.windows import Rows, numbers_of
 
@@ -172,7 +173,9 @@ class ImpactTimes:
         for other_rate in self.layout.others.rates:
             distinct = labels.all_said(other_rate.column)  # a rate is the same in all rows
             said = number_said(distinct[0]) if len(distinct) == 1 else None
-            if said is not None and not _is_among(other_rate.rate_of(said), rates, OTHER_CLOCK):
+            if said is None or (not other_rate.sure and other_rate.rate_of(said) < LEAST_HZ):
+                continue
+            if not _is_among(other_rate.rate_of(said), rates, OTHER_CLOCK):
                 raise _other(other_rate.heading, other_rate.rate_of(said))
         for name, stated in self.layout.others.stated:
             if not _is_among(stated, rates, OTHER_CLOCK):

@@ -13,6 +13,7 @@ from headimpact_service.ingest.table import Table
 from headimpact_service.ingest.time_headings import (
     hertz_of_rates,
     may_be_times,
+    names_samples,
     names_trigger,
     period_of_samples,
     unit_of_times,
@@ -40,6 +41,8 @@ class OtherRate:
     heading: str
     hertz: float
     period_ms: float | None = None
+    sure: bool = True
+    """Whether its heading speaks of samples: else only what no other rate is, some hundred hertz, is one of theirs."""
 
     def rate_of(self, said: float) -> float:
         """The rate that a number in it says [Hz]; none of a period says infinitely many."""
@@ -85,7 +88,8 @@ def other_times(headings: Headings, read: Collection[int], table: Table, times: 
         period_ms = period_of_samples(heading, beside)
         hertz = hertz_of_rates(heading, beside, fs_is_rate=fs_is_rate)
         if (period_ms is not None or hertz is not None) and column not in table.wordless:
-            rates.append(OtherRate(column, heading, hertz or 1.0, period_ms))
+            sure = period_ms is not None or names_samples(heading)
+            rates.append(OtherRate(column, heading, hertz or 1.0, period_ms, sure))
         elif (is_dated or may_be_times(heading)) and table.has_samples(column):
             may_count = column in times or names_trigger(heading)
             unit = DATES_IN if is_dated else unit_of_times(heading, beside)

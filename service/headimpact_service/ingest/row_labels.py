@@ -19,6 +19,7 @@ from headimpact_service.ingest.blocks import (
     mark_blocks,
     number_impacts,
     peaks_lie_in_blocks,
+    tell_parts,
     tell_parts_or_name_them,
 )
 from headimpact_service.ingest.cells import said
@@ -91,9 +92,10 @@ class RowLabels:
         for columns, tell, what in (
             (unread.names, are_named_apart if unread.alone else are_several, _SAY),
             (unread.impacts, number_impacts, _SAY),
-            (unread.times, partial(lie_apart, time_zone=time_zone), _TIME),
-            (unread.counters, begins_anew, _COUNT),
+            (() if unread.named else unread.times, partial(lie_apart, time_zone=time_zone), _TIME),
+            (() if unread.named else unread.counters, begins_anew, _COUNT),
             (unread.others, tell_parts_or_name_them, _SAY),
+            (unread.remarks, tell_parts, _SAY),
             (unread.marks, mark_blocks, _SAY),
             (unread.triggers, count_triggers, _SAY),
             (unread.peaks, peaks_lie_in_blocks, _SAY),

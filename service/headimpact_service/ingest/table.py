@@ -55,6 +55,10 @@ class Table(Protocol):
         """The rows of cells above the headings, as far as the format gives them."""
 
     @property
+    def beside(self) -> Sequence[Sequence[str]]:
+        """Rows of what the file says elsewhere, perhaps of this table: a workbook's sheets of words before it."""
+
+    @property
     def wordless(self) -> Collection[int]:
         """Columns whose cells cannot be read as text."""
 

@@ -246,7 +246,7 @@ def _says_axes(layout: Layout, plan: Plan) -> bool:
 
 def _require_no_other_axes(layout: Layout, plan: Plan, table: Table) -> None:
     """Refuse to take the axes for anatomical where a row above the headings says that they are SAE's."""
-    if _says_axes(layout, plan) or (stated := axes_stated(table.above)) is None:
+    if _says_axes(layout, plan) or (stated := axes_stated([*table.above, *table.beside])) is None:
         return
     raise file_fault(
         f"A row above the headings says {stated} of the axes, which is not read: give axes beside the file (sae_j211, "

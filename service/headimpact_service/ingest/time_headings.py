@@ -44,6 +44,8 @@ _OF_SAMPLES = frozenset(
 )
 _OF_SAMPLED = _OF_SAMPLES | {"sampled", "acquired", "recorded", "logged", "daq"}
 _TRIGGER = frozenset({"trigger", "triggered", "rel", "relative", "contact", "zero"})
+LEAST_HZ = 100.0
+"""What is said to be a rate and is less is none of samples, unless it says so."""
 _PERIODS = frozenset({"dt", "interval", "period", "step", "abtastintervall", "abtastperiode"})
 _ALONE = frozenset(
     {
@@ -59,6 +61,21 @@ _NOT_OF_SAMPLES = frozenset(
         *("heart", "pulse", "respiration", "ecg", "emg", "video", "camera", "audio", "frames", "fps"),
         *("mag", "magnetometer", "baro", "barometer", "gps", "quat", "quaternion", "temp", "temperature"),
         *("original", "raw", "native", "source", "min", "max", "minimum", "maximum", "limit", "high"),
+        *(
+            "load",
+            "cell",
+            "microphone",
+            "mic",
+            "strain",
+            "gauge",
+            "force",
+            "pressure",
+            "radar",
+            "aggregate",
+            "internal",
+        ),
+        *("supported", "decimated", "downsampled", "resampled", "code", "dominant", "excitation", "fundamental"),
+        *("calibration", "nyquist", "content", "band", "loading", "peak", "filtered"),
     }
 )
 """Words of what has times and rates of its own and is none of the signals, or no longer those of the samples."""
@@ -103,7 +120,7 @@ def names_trigger(heading: str) -> bool:
 def speaks_of_samples(text: str) -> bool:
     """Whether a sentence is about how samples were taken, and not about a filter or another instrument."""
     words = _words(text)
-    return bool(words & (_OF_SAMPLED | _RATE | _ALONE)) and not words & (_NOT_OF_SAMPLES | _OTHER_RATES)
+    return bool(words & (_OF_SAMPLED | _ALONE)) and not words & (_NOT_OF_SAMPLES | _OTHER_RATES)
 
 
 def period_of_samples(heading: str, beside: str | None) -> float | None:
@@ -146,11 +163,22 @@ def hertz_of_rates(heading: str, beside: str | None, *, fs_is_rate: bool) -> flo
         return thousands
     if len(words) == 1 and words & (_RATE | {"hz", "fs", "srate", "fsamp", "fsample"}):
         return 1.0
-    in_hertz = "hz" in words and words & (_OF_SAMPLES | _ANY_SENSOR | _RATE | {"fs"})
+    rate_alone = words <= _RATE | {"hz", "khz", "k"}
+    in_hertz = "hz" in words and (rate_alone or words & (_OF_SAMPLES | _ANY_SENSOR | {"fs"}))
     of_one = words & _ANY_SENSOR and (words & _RATE or (fs_is_rate and "fs" in words))
-    if in_hertz or of_one or (words & _RATE and words & _OF_SAMPLES) or words & _ALONE or {"samples", "per"} <= words:
+    if in_hertz or of_one or (words & _RATE and words & _OF_SAMPLES) or words & _ALONE or _are_per_second(words):
         return 1000.0 if "khz" in f"{heading} {beside}".lower() else 1.0
     return None
+
+
+def names_samples(heading: str) -> bool:
+    """Whether a heading of a rate speaks of samples or a sensor: a `rate` or a `frequency` may be of anything."""
+    words = _words(heading)
+    return bool(words & (_OF_SAMPLED | _ALONE | _ANY_SENSOR | {"fs", "srate", "fsamp", "fsample"}))
+
+
+def _are_per_second(words: set[str]) -> bool:
+    return {"samples", "per"} <= words and bool(words & {"s", "sec", "second", "seconds"})
 
 
 def _words(heading: str) -> set[str]:

@@ -58,6 +58,7 @@ _MEASURED = frozenset(
 """Words of what is measured, whatever it is of: a sensor's temperature."""
 _STATES = frozenset({"is", "flag", "state", "status", "error", "phase", "stage", "mode"})
 _TRIGGERS = frozenset({"trigger", "triggered", "active"})
+_REMARKS = frozenset({"comment", "comments", "note", "notes", "annotation", "annotations", "kommentar", "bemerkung"})
 _MARKS = _STATES | _TRIGGERS
 """Words of what comes and goes within an impact: an event's flag."""
 _NUMBER_SIGN = "#"
@@ -65,6 +66,7 @@ _COUNTS = frozenset({_NUMBER_SIGN, "count"})
 """Words that, like names, make a trigger one that is counted."""
 _TIMES = frozenset({"t", "time", "times", "date", "stamp", "timestamp", "datetime", "clock", "elapsed", "zeit"})
 _COUNTERS = frozenset({"sample", "samples", "index", "idx", "frame", "row", "point", "scan", "counter"})
+_OTHER_FRAMES = frozenset({"video", "camera", "film"})
 _NO_NAMES = _MEASURED | _STATES | _TIMES | _COUNTERS
 _DATE = re.compile(r"[0-9]{1,4}([-./])[0-9]{1,2}\1[0-9]{1,4}", re.ASCII)
 _CLOCK = re.compile(r"(?:([0-9]{1,2}):)?([0-9]{1,2}):([0-9]{2}(?:[.,][0-9]{1,9})?)(?![0-9:])")
@@ -89,12 +91,16 @@ class Unread:
     triggers: tuple[int, ...] = ()
     measured: tuple[int, ...] = ()
     peaks: tuple[int, ...] = ()
+    remarks: tuple[int, ...] = ()
+    """What somebody wrote, perhaps of a moment within an impact: its words name no rows."""
     impacts: tuple[int, ...] = ()
     """Names of impacts that tell even where something else would: by a number of its own, or one each row."""
     hints: tuple[int, ...] = ()
     """Names that tell nothing where samples have times, but how to part the rows if these begin anew."""
     alone: bool = False
     """Whether nothing that is read would tell."""
+    named: bool = False
+    """Whether the sender has named what tells impacts apart."""
     said_one: bool = False
     """Whether the sender says that the rows are one impact."""
 
@@ -107,7 +113,7 @@ class Unread:
     @property
     def watched(self) -> tuple[int, ...]:
         """Those that must say the same, or count on, within an impact."""
-        told = (*self.names, *self.times, *self.counters, *self.others, *self.impacts)
+        told = (*self.names, *self.times, *self.counters, *self.others, *self.impacts, *self.remarks)
         return (*told, *self.marks, *self.triggers, *self.peaks, *self.measured)
 
     @property
@@ -135,14 +141,16 @@ def unread_columns(
         words = {*words_of(heading), *(_NUMBER_SIGN if _NUMBER_SIGN in heading else "")}
         if column in passed:
             continue
+        if words & _OTHER_FRAMES and words & _COUNTERS:  # several samples have one
+            continue
         if words & _IMPACTS and not (named or words & _NO_NAMES):
             found.setdefault("impacts", []).append(column)
         if (kind := _kind(words, telling, timed=timed, alone=alone)) is None:
             continue
-        if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "marks", "triggers", "measured"}:
+        if len(found.get(kind, ())) < MAX_OTHERS or kind not in {"others", "remarks", "marks", "triggers", "measured"}:
             found.setdefault(kind, []).append(column)
     columns: dict[str, Any] = {kind: tuple(of_kind) for kind, of_kind in found.items()}
-    return Unread(**columns, alone=alone)
+    return Unread(**columns, alone=alone, named=named)
 
 
 def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> str | None:
@@ -160,7 +168,9 @@ def _kind(words: Set[str], telling: Set[str], *, timed: bool, alone: bool) -> st
         return "names"
     if words & (_NAMES | _PARTS):
         return "hints"
-    return "others" if alone else None
+    if not alone:
+        return None
+    return "remarks" if words & _REMARKS else "others"
 
 
 def left_out(cells: Sequence[str]) -> tuple[float, float, float] | None:

@@ -293,7 +293,7 @@ def test_a_workbook_s_midnight_is_a_time():
     day = dt.datetime(2026, 10, 3, tzinfo=dt.UTC).replace(tzinfo=None)
     cells = [day - dt.timedelta(milliseconds=1), day.date(), day + dt.timedelta(milliseconds=1)]
     block = _Block([0], ["time"], [""], [[cell] for cell in cells])
-    table = SheetTable([block], [])
+    table = SheetTable([block], [], [])
     assert table.dated == {0}
     [read_columns] = table.blocks([0], [])
     np.testing.assert_allclose(read_columns.numbers[0], [0.0, 1000.0, 2000.0])

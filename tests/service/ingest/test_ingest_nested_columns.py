@@ -182,3 +182,26 @@ def test_facts_in_a_struct_are_called_by_their_own_names(name: str):
         assert record.context == {"session_id": f"s-{number}"}
         assert (record.external_id, record.athlete_external_id) == (f"i{number}", f"p-{number}")
         assert [signal.sample_rate_hz for _, signal in record.recording.signals()] == [2000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    "beside", [[[1.0, 0.0, 0.0, 0.0]] * 120, [["a", "b"]] * 120, [[]] * 120], ids=["quat", "tags", "none"]
+)
+def test_other_lists_leave_vectors_what_they_are(beside: list[Any]):
+    table = of_samples(np.ndarray.tolist, pa.list_(pa.float64())) | {"beside": beside}
+    assert all(isinstance(record, ImpactRecord) for record in read(parquet(pa.table(table))))
+
+
+@pytest.mark.parametrize("shape", ["a sample", "an impact"])
+def test_clocks_go_on_behind_midnight(shape: str):
+    stamps = [(86_400_000 - 20 + n) % 86_400_000 for n in range(SAMPLES)]
+    if shape == "a sample":
+        columns = of_samples(np.ndarray.tolist, pa.list_(pa.float64(), 3))
+        del columns["t_ms"]
+        columns["time"] = pa.array(stamps * IMPACTS, pa.int32()).cast(pa.time32("ms"))
+    else:
+        columns = of_impacts(np.ndarray.tolist)
+        columns["time"] = pa.array([stamps] * IMPACTS, pa.list_(pa.int32())).cast(pa.list_(pa.time32("ms")))
+    for record in read(parquet(pa.table(columns))):
+        assert isinstance(record, ImpactRecord), record.as_dict()
+        assert {signal.sample_rate_hz for _, signal in record.recording.signals()} == {1000.0}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from binary_files import noise, npz
-from ingest_files import codes, read, refused, six_axis
+from ingest_files import codes, one, read, refused, six_axis
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.mapping import Mapping
@@ -252,3 +252,12 @@ def test_an_array_for_each_channel_is_one_impact():
 )
 def test_channels_that_do_not_fit_are_refused(arrays_: dict[str, Any], told: str):
     assert told in refused(npz(**arrays_)).detail
+
+
+@pytest.mark.parametrize("name", ["unit", "units"])
+@pytest.mark.parametrize("said", ["g", "SI", "ms"])
+def test_a_unit_of_no_array_is_none_of_the_times_(name: str, said: str):
+    values = noise(1)[0]
+    arrays = {"linear_acceleration": values[:, :3], "angular_velocity": values[:, 3:], "time_ms": np.arange(40.0)}
+    units = {"linear_acceleration_unit": "g", "angular_velocity_unit": "rad/s", name: said}
+    assert one(npz(**arrays, **{key: np.array(text) for key, text in units.items()})).recording.linear_acceleration

@@ -77,12 +77,27 @@ class TestRowsOfSeveral:
             ["good contact", *[""] * 119],
             [*[""] * 20, "trigger", *[""] * 99],
             ["yes"] * 70 + ["no"] * 50,
+            ["logger started", *[""] * 49, "strap loose", *[""] * 69],
             [36.6 + n // 40 / 10 for n in range(SAMPLES)],
         ],
     )
     def test_what_is_said_within_one_impact_leaves_it_one(self, write: Any, cells: Sequence[Any]) -> None:
-        table = write(untimed({"Foo": [None if cell == "" else cell for cell in cells]}))
+        heading = "comment" if "strap loose" in cells else "Foo"
+        table = write(untimed({heading: [None if cell == "" else cell for cell in cells]}))
         assert shape(one(table, sample_rate_hz=1000.0)) == (SAMPLES, 3)
+
+    @every_table
+    def test_a_video_s_frames_have_several_samples(self, write: Any) -> None:
+        table = write(untimed({"video_frame": [n // 8 for n in range(SAMPLES)]}))
+        assert shape(one(table, sample_rate_hz=1000.0)) == (SAMPLES, 3)
+
+    @every_table
+    def test_a_counter_beside_what_the_sender_says_tells_impacts_apart(self, write: Any) -> None:
+        frames = [n // 8 for n in range(SAMPLES)]
+        table = write(untimed({"impact_id": ["a"] * 70 + ["b"] * 50, "frame": frames}))
+        assert codes(read(table, sample_rate_hz=1000.0)[0]) == [(None, "several-impacts")]
+        named = Mapping(group_by=["impact_id"])
+        assert [shape(item) for item in read(table, sample_rate_hz=1000.0, mapping=named)] == [(70, 3), (50, 3)]
 
     def test_headings_that_stand_again_in_a_sheet_join_two_tables(self) -> None:
         rows = untimed()
@@ -144,6 +159,10 @@ class TestRates:
             "Period,0.5 ms",
             '"Sample rate (Hz)","2,000"',
             "Sample rate (Hz),2.000",
+            "Sample rate: 2,000 Hz",
+            "Sampling rate: 2k",
+            "Data filtered at 1000 Hz and sampled at 2000 Hz",
+            "Filter 1000 Hz. Sample rate: 2000 Hz.",
         ],
     )
     def test_in_words_or_in_cells(self, row: str) -> None:
@@ -163,6 +182,21 @@ class TestRates:
             "Record of 2 s",
             "Period,2",
             "Period,2,s",
+            "Samples per impact: 100",
+            "Sample rate: 1,000 Hz",
+            "Sampling rate: 1k",
+            "Filtered at 300 Hz (4th order), sampled at 1000 Hz",
+            "Acceleration data were filtered at 1650 Hz; sampling at 1 kHz",
+            "Sample rate code: 7",
+            "Dominant frequency (Hz),120",
+            "Nyquist frequency: 500 Hz",
+            "Loading rate: 300 Hz",
+            "Data rate: 250 kHz",
+            "Load cell sample rate: 20000 Hz",
+            "Pressure sampled at 100 Hz",
+            "Supported sample rates: 1000, 2000, 3200 Hz",
+            "Data were sampled at 20000 Hz and decimated to 1000 Hz",
+            "Sample rate,e.g. 3200 Hz",
             "Player 2000",
             "Sampled by 2 persons",
         ],
@@ -175,7 +209,16 @@ class TestRates:
         info = [["Player", "p-17"], ["Sample rate (Hz)", 2000]]
         assert codes(refused(xlsx({"Info": info, "Data": rows}))) == [("sample_rate_hz", "rate-differs")]
         info[1][1] = 1000
-        assert one(xlsx({"Info": info, "Data": rows})).athlete_external_id == "p-17"
+        assert one(xlsx({"Info": info, "Data": rows})).athlete_external_id is None  # of whichever table it is
+
+    def test_in_the_sheet_that_comes_last_before_each_table(self) -> None:
+        sheets: dict[str, Any] = {}
+        for rate in (1000, 2000):
+            times = (n / rate for n in range(len(six_axis())))
+            sheets[f"Info {rate}"] = [["Sample rate (Hz)", rate], ["Changed", "sampled at 500 Hz before"]]
+            table = [[time, *row] for time, row in zip(times, six_axis().tolist(), strict=True)]
+            sheets[f"Data {rate}"] = [GENERIC.split(","), *table]
+        assert [isinstance(item, ImpactRecord) for item in read(xlsx(sheets))] == [True, True]
 
     @pytest.mark.parametrize("attributes", [{"fs": 2000}, {"sampling_rate": "2 kHz"}])
     def test_in_what_a_data_frame_says_of_itself(self, attributes: dict[str, Any]) -> None:
@@ -236,6 +279,19 @@ class TestAxes:
         assert one(text, axes="sae_j211").recording.axes == "sae_j211"
         assert one(text, axes="anatomical").recording.axes == "anatomical"
 
+    @pytest.mark.parametrize(
+        "rows",
+        [
+            "y right; z down",
+            "x forward, y right, z down",
+            "y axis: right\nz axis: down",
+            "+Y right, +Z down",
+            "y,right",
+        ],
+    )
+    def test_by_their_directions(self, rows: str) -> None:
+        assert codes(refused(f"{rows}\n{csv_text()}")) == [("axes", "axes-unclear")]
+
     @pytest.mark.parametrize("heading", ["frame", "coordinate_system", "Convention", "axis_system"])
     @pytest.mark.parametrize("said", WORDS)
     def test_by_a_column(self, heading: str, said: str) -> None:
@@ -245,7 +301,10 @@ class TestAxes:
         mapped = Mapping.model_validate({"axes": "anatomical"})
         assert one(text, mapping=mapped).recording.axes == "anatomical"
 
-    @pytest.mark.parametrize("said", ["head", "anatomical", "x forward, y left, z up", "2110", "right-handed", "12"])
+    @pytest.mark.parametrize(
+        "said",
+        ["head", "anatomical", "x forward, y left, z up", "2110", "right-handed", "12", "SAE J211 or anatomical"],
+    )
     def test_other_words_for_axes_are_none_of_theirs(self, said: str) -> None:
         assert one(csv_text(before={"frame": f'"{said}"'})).recording.axes == "anatomical"
         assert one(f"Axes: {said}\n{csv_text()}").recording.axes == "anatomical"
@@ -264,7 +323,13 @@ class TestUnits:
         assert codes(refused(text)) == [("mapping", "units-differ")]
         assert one(text, mapping=_generic()).recording.linear_acceleration.unit == "g"
 
-    @pytest.mark.parametrize("said", ["g", "g, rad/s", "mixed", "", "ms"])
+    def test_one_behind_a_column_that_is_not_read_may_be_of_that(self) -> None:
+        lines = [
+            f"gravity,unit,{row}" if n == 0 else f"9.81,m/s^2,{row}" for n, row in enumerate(csv_text().splitlines())
+        ]
+        assert one("\n".join(lines)).recording.linear_acceleration.unit == "g"
+
+    @pytest.mark.parametrize("said", ["g", "g, rad/s", "g rad/s", "g / rad/s", "g+rad/s", "g_rad/s", "mixed", "", "ms"])
     def test_a_column_of_the_same_or_of_none(self, said: str) -> None:
         assert one(csv_text(before={"Unit": f'"{said}"'})).recording.linear_acceleration.unit == "g"
 
@@ -323,6 +388,12 @@ class TestFacts:
         record = one(rows + csv_text())
         assert (record.athlete_external_id, record.device_serial, record.occurred_at) == ("p-17", "mg-42", self.WHEN)
 
+    def test_an_id_counts_before_a_name_and_none_where_a_mapping_reads_none(self) -> None:
+        rows = "Player: Tom Jones\nPlayer ID: 17\nDevice ID: mg-1\n"
+        assert one(rows + csv_text()).athlete_external_id == "17"
+        record = one(rows + csv_text(), mapping=Mapping.model_validate({"athlete": None, "device": None}))
+        assert (record.athlete_external_id, record.device_serial) == (None, None)
+
     def test_what_stands_nearer_counts(self) -> None:
         rows = "Player,p-17\nEvent time,2026-03-05T14:05:22Z\nDevice ID,mg-42\n"
         text = rows + csv_text(before={"athlete": "p-1", "device": "mg-1", "occurred_at": "2026-01-01T00:00:00Z"})
@@ -361,7 +432,6 @@ class TestFacts:
         text = csv_text(before={"impact_id": "a", "date": "2026-03-05", "time": "14:05:22"}, heading=GENERIC)
         assert one(text, time_zone="UTC").occurred_at == self.WHEN
         assert one(text).occurred_at is None
-        assert one("Date,2026-03-05\nTime,14:05:22\n" + csv_text(), time_zone="UTC").occurred_at == self.WHEN
 
 
 def test_axes_below_quantities_that_stand_above_each_of_them_are_headings() -> None:

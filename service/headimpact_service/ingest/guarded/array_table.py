@@ -55,6 +55,7 @@ class ArrayTable:
     parted = True
     dated = frozenset[int]()
     above: Sequence[Sequence[str]] = ()
+    beside: Sequence[Sequence[str]] = ()
 
     def __init__(self, samples: Sequence[Samples], facts: Sequence[Fact], units: Mapping[str, str]) -> None:
         """Samples with times first, so that a signal's own times stand before it; `units` are texts by their names."""

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from headimpact_service.ingest.cells import Words, number_text
-from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, are_dated
+from headimpact_service.ingest.dated import DAY_S, FIRST_ROWS, NIGHT_S, Elapsed, are_dated
 from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, stated, unreadable
 from headimpact_service.ingest.guarded.nested_columns import Batches, is_list, laid_out
 from headimpact_service.ingest.heading_rows import LOOK
@@ -52,6 +52,8 @@ def _is_instant(kind: pa.DataType) -> bool:
 
 class ArrowTable:
     """A table over batches of Arrow columns."""
+
+    beside: Sequence[Sequence[str]] = ()
 
     def __init__(self, schema: pa.Schema, batches: Batches) -> None:
         """Look at the schema, and for times that are text at the first rows."""
@@ -100,7 +102,7 @@ class ArrowTable:
 
     def _numbers(self, column: pa.Array) -> FloatArray:
         if not is_text(column.type):
-            return floats(column)
+            return unwrapped(floats(column)) if pa.types.is_time(column.type) else floats(column)
         return np.array([self._elapsed.microseconds(cell or "") for cell in column.to_pylist()])
 
     def _require_numbers(self, place: int) -> None:
@@ -141,6 +143,14 @@ def floats(column: pa.Array) -> FloatArray:
     column = _in_microseconds(column)
     cast = column.cast(pa.float64(), safe=False)
     return np.ascontiguousarray(cast.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def unwrapped(microseconds: FloatArray) -> FloatArray:
+    """Times of day that go on behind midnight, as :class:`Elapsed` has them of text."""
+    steps = np.diff(microseconds, prepend=microseconds[:1])
+    days = np.cumsum((steps < -NIGHT_S * 1e6).astype(np.float64) - (steps > NIGHT_S * 1e6))
+    found: FloatArray = microseconds + days * (DAY_S * 1e6)
+    return found
 
 
 def _in_microseconds(column: pa.Array) -> pa.Array:
@@ -226,7 +236,8 @@ class _Lists:
     def __init__(self, column: pa.Array) -> None:
         self.lengths = pc.fill_null(pc.list_value_length(column), 0).to_numpy(zero_copy_only=False).astype(np.int64)
         self.starts = np.cumsum(self.lengths) - self.lengths
-        self._values = floats(column.flatten())
+        values = column.flatten()
+        self._values = unwrapped(floats(values)) if pa.types.is_time(values.type) else floats(values)
 
     def laid_out(self, first: int, rooms: np.ndarray[Any, np.dtype[np.int64]]) -> FloatArray:
         """The lists from the `first` on, each in the room it is given, NaN where it is shorter."""

@@ -29,6 +29,7 @@ class StructTable:
     parted = True
     dated = frozenset[int]()
     above: Sequence[Sequence[str]] = ()
+    beside: Sequence[Sequence[str]] = ()
 
     def __init__(self, impacts: Sequence[dict[str, Any]]) -> None:
         """Look at every field once."""

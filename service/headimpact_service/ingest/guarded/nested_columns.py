@@ -83,8 +83,11 @@ def laid_out(schema: pa.Schema, batches: Batches) -> tuple[pa.Schema, Batches]:
 
 
 def _vectors(schema: pa.Schema, batches: Batches) -> dict[int, int]:
-    """The widths of lists of numbers that hold a vector a row, by the first rows, if all such lists do."""
-    places = [place for place, kind in enumerate(schema.types) if is_list(kind) and not _is_nested(kind)]
+    """The widths of lists of numbers that hold a vector a row, by the first rows: if each has one, and some have three.
+
+    Lists that hold nothing yet have none, and are no columns; those of words are none of the samples'.
+    """
+    places = [place for place, kind in enumerate(schema.types) if _is_list_of_numbers(kind)]
     if not places:
         return {}
     lengths: list[set[int]] = [set() for _ in places]
@@ -95,10 +98,19 @@ def _vectors(schema: pa.Schema, batches: Batches) -> dict[int, int]:
             found |= set(pc.list_value_length(column).drop_null().to_pylist())
         if rows >= FIRST_ROWS:
             break
-    widths = [min(found) for found in lengths if len(found) == 1]
-    if rows < FIRST_ROWS or len(widths) < len(places) or not set(widths) <= VECTORS:
+    told = {place: found for place, found in zip(places, lengths, strict=True) if found - {0}}
+    widths = {place: min(found) for place, found in told.items() if len(found) == 1 and min(found) <= MAX_WIDTH}
+    if rows < FIRST_ROWS or len(widths) < len(told) or VECTORS.isdisjoint(widths.values()):
         return {}
-    return dict(zip(places, widths, strict=True))
+    return dict.fromkeys(places, 0) | widths
+
+
+def _is_list_of_numbers(kind: pa.DataType) -> bool:
+    types = pa.types
+    if not is_list(kind) or _is_nested(kind):
+        return False
+    held = kind.value_type
+    return bool(types.is_integer(held) or types.is_floating(held) or types.is_null(held))
 
 
 def is_list(kind: pa.DataType) -> bool:

@@ -12,6 +12,7 @@ _ALONE = frozenset({"unit", "units"})
 _BEHIND, _BEFORE = ("_unit", "_units"), ("unit_", "units_")
 _TURNING = frozenset({"ang", "angular", "rot", "rotational", "gyr", "gyro", "omega", "w", "av", "alpha"})
 _OF_TURNS = re.compile("rad|deg|dps|°", re.IGNORECASE)
+_OF_TIMES = re.compile(r"t(ime|imes|imestamp|imestamps)?(_|$)", re.IGNORECASE)
 _PARTED = re.compile(r"\s*[;,|]\s*")
 
 
@@ -34,7 +35,9 @@ def of_columns(columns: Sequence[tuple[str, int]], texts: Mapping[str, str]) -> 
 
 
 def _shared(name: str, unit: str) -> str:
-    """A unit that is said of no array, for those that it may be of: of turns or not."""
+    """A unit that is said of no array, for those that it may be of: of turns or not, and of no times."""
+    if _OF_TIMES.match(name):
+        return ""
     turns = not _TURNING.isdisjoint(words_of(name))
     return unit if ";" in unit or turns == (_OF_TURNS.search(unit) is not None) else ""
 

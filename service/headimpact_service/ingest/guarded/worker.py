@@ -117,6 +117,7 @@ def _offer(connection: socket.socket, content: NamedTable) -> bool:
         "headings": table.headings,
         "units": units,
         "above": [list(row) for row in table.above],
+        "beside": [list(row) for row in table.beside],
         "dated": list(table.dated),
         "wordless": list(table.wordless),
         "parted": table.parted,

@@ -57,7 +57,7 @@ Row = list[Any]
 
 
 def contents(stream: BinaryIO) -> Iterator[Content]:
-    """Every worksheet that has headings with numbers below them; what a sheet of words before it says is said of it."""
+    """Every worksheet that has headings with numbers below them, with the sheets of words that come last before it."""
     GuardedZip(stream)
     stream.seek(0)
     workbook = CalamineWorkbook.from_filelike(stream)
@@ -66,13 +66,15 @@ def contents(stream: BinaryIO) -> Iterator[Content]:
         raise unreadable(f"A workbook may have at most {MAX_SHEETS} sheets.")
     found = False
     beside: list[list[str]] = []
+    is_told = False
     for name in names:
         blocks, above = _blocks(workbook.get_sheet_by_name(name))
         if blocks:
-            found = True
-            yield NamedTable(checked_text(name), SheetTable(blocks, [*beside, *above]))
+            found = is_told = True
+            yield NamedTable(checked_text(name), SheetTable(blocks, above, beside))
         else:
-            beside = (beside + above)[:LOOK]
+            beside = above if is_told else (beside + above)[:LOOK]
+            is_told = False
     if not found:
         raise unreadable("No sheet of the workbook has headings with numbers below them.")
 
@@ -121,9 +123,10 @@ class SheetTable:
     parted = False
     wordless = frozenset[int]()
 
-    def __init__(self, blocks: list[_Block], above: list[list[str]]) -> None:
-        """Headings of all blocks, in their order, and the rows above the first of them."""
+    def __init__(self, blocks: list[_Block], above: list[list[str]], beside: list[list[str]]) -> None:
+        """Headings of all blocks, in their order, the rows above the first of them, and those of sheets of words."""
         self.above: Sequence[Sequence[str]] = above
+        self.beside: Sequence[Sequence[str]] = beside
         self.headings = checked_headings(heading for block in blocks for heading in block.headings)
         self.units = dict(enumerate(checked_headings(unit for block in blocks for unit in block.units)))
         self._places = [(block, place) for block in blocks for place in range(len(block.columns))]
