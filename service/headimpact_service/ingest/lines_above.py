@@ -57,7 +57,7 @@ def rates_stated(rows: Rows, *, sentences: bool) -> Iterator[tuple[str, float]]:
     for name, cells in facts_stated(rows):
         found = _rate_in_cells(name, cells)
         if found is None and sentences:
-            found = _rate_in_words(" ".join([name, *cells]))
+            found = _rate_in_words(" ".join([name, *cells])) or _rate_in_words("; ".join([name, *cells]))
         if found is not None and found >= LEAST_HZ:
             yield name, found
 

@@ -162,6 +162,7 @@ class TestRates:
             "Sample rate: 2,000 Hz",
             "Sampling rate: 2k",
             "Data filtered at 1000 Hz and sampled at 2000 Hz",
+            "Filtered at 1000 Hz, sampled at 2000 Hz",
             "Filter 1000 Hz. Sample rate: 2000 Hz.",
         ],
     )
