@@ -55,6 +55,8 @@ _CLAUSES = re.compile(r"[;()]|[,.]\s|\band\b")
 def rates_stated(rows: Rows, *, sentences: bool) -> Iterator[tuple[str, float]]:
     """The sample rates that rows state, and the rows' names: a number in its cell, or one within a sentence [Hz]."""
     for name, cells in facts_stated(rows):
+        if not _NO_LONGER.isdisjoint(words_of(" ".join([name, *cells]))):
+            continue
         found = _rate_in_cells(name, cells)
         if found is None and sentences:
             found = _rate_in_words(" ".join([name, *cells])) or _rate_in_words("; ".join([name, *cells]))
@@ -90,8 +92,6 @@ def _whole(cells: Sequence[str], place: int) -> Sequence[str]:
 
 def _rate_in_words(text: str) -> float | None:
     """The rate in a sentence about sampling: `Data were sampled at 2000 Hz`, `Sampling interval 0.5 ms`."""
-    if not _NO_LONGER.isdisjoint(words_of(text)):
-        return None
     told = (_rate_in_clause(clause) for clause in _CLAUSES.split(text))
     return next((rate for rate in told if rate is not None), None)
 

@@ -14,6 +14,8 @@ import pytest
 from binary_files import COLUMNS, mat, npz, parquet, xlsx
 from ingest_files import GENERIC, codes, csv_text, one, read, refused, six_axis, zipped
 
+from headimpact_service.ingest.facts_beside import facts_above
+from headimpact_service.ingest.guarded.xlsx_file import _stated
 from headimpact_service.ingest.mapping import Mapping
 from headimpact_service.ingest.record import ImpactRecord
 
@@ -198,6 +200,7 @@ class TestRates:
             "Supported sample rates: 1000, 2000, 3200 Hz",
             "Data were sampled at 20000 Hz and decimated to 1000 Hz",
             "Sample rate,e.g. 3200 Hz",
+            "ODR: 3200 Hz (decimated to 1000 Hz)",
             "Player 2000",
             "Sampled by 2 persons",
         ],
@@ -394,6 +397,10 @@ class TestFacts:
         assert one(rows + csv_text()).athlete_external_id == "17"
         record = one(rows + csv_text(), mapping=Mapping.model_validate({"athlete": None, "device": None}))
         assert (record.athlete_external_id, record.device_serial) == (None, None)
+
+    def test_a_workbook_s_own_date_above_the_table_is_a_time(self) -> None:
+        cell = dt.datetime(2026, 3, 5, 14, 5, 22)  # noqa: DTZ001 - as a sheet has it
+        assert facts_above([["Event time", _stated(cell)]], "UTC").occurred_at == self.WHEN
 
     def test_what_stands_nearer_counts(self) -> None:
         rows = "Player,p-17\nEvent time,2026-03-05T14:05:22Z\nDevice ID,mg-42\n"

@@ -228,7 +228,7 @@ def _begun(rows: Sequence[Row], numbers: Row) -> _Block | None:
 
 
 def _stated(cell: Any) -> str:  # noqa: ANN401 - any cell
-    return number_text(float(cell)) if _is_number(cell) else _word(cell)
+    return number_text(float(cell)) if _is_number(cell) else _time(cell)
 
 
 def _word(cell: Any) -> str:  # noqa: ANN401 - any cell
