@@ -11,7 +11,7 @@ import numpy as np
 from headimpact_service.ingest.cells import is_written_number, numbers_said, said
 from headimpact_service.ingest.spelling import words_of
 
-_WITH_PARTS = re.compile(r"[+-]?[0-9]*\.[0-9]*[1-9][0-9]*([eE][+-]?[0-9]+)?")
+_WITH_PARTS = re.compile(r"[+-]?[0-9]*+\.0*+[1-9][0-9]*+([eE][+-]?[0-9]+)?")
 _PHASES = frozenset(
     {
         *("pre", "post", "before", "during", "after", "pretrigger", "posttrigger", "trigger", "triggered", "impact"),

@@ -19,7 +19,7 @@ NOTHING = frozenset({"", "-", ".", "na", "n/a", "#n/a", "nan", "nat", "null", "m
 
 Not `none`: that is a filter.
 """
-_WRITTEN_NUMBER = re.compile(r"[+-]?([0-9]+[.,]?[0-9]*|[.,][0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
+_WRITTEN_NUMBER = re.compile(r"[+-]?([0-9]++([.,][0-9]*+)?|[.,][0-9]++)([eE][+-]?[0-9]+)?", re.ASCII)
 
 
 def said(cell: str) -> str:

@@ -49,7 +49,7 @@ ROWS_AT_ONCE = 4096
 _SEPARATOR = re.compile(r"sep=.\s*", re.IGNORECASE)
 Block = tuple[FloatArray, Sequence[Sequence[str]]]
 # float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
-_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
+_NUMBER = re.compile(r"\s*[+-]?([0-9]++(\.[0-9]*+)?|\.[0-9]++)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
 
 def read_csv(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:

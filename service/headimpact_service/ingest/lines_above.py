@@ -14,7 +14,7 @@ Rows = Sequence[Sequence[str]]
 
 _WITH_VALUE = re.compile(r"([^:=]+)[:=](.+)", re.DOTALL)
 """A row's name with what it says in one cell: `Sample rate (Hz): 2000`."""
-_NUMBER = re.compile(r"([+-]?[0-9.,]+(?:[eE][+-]?[0-9]+)?)\s*([A-Za-zµ/]*)")
+_NUMBER = re.compile(r"([+-]?[0-9.,]++(?:[eE][+-]?[0-9]+)?)\s*([A-Za-zµ/]*)")
 """A number, and its unit if that stands behind it."""
 _UNIT = re.compile(r"[(\[]?([A-Za-zµ/]{1,20})[)\]]?")
 """A unit in a cell of its own."""
@@ -25,6 +25,8 @@ _FEW, _THREE = re.compile("[1-9][0-9]{0,2}"), re.compile("[0-9]{3}([^0-9]|$)")
 """The parts of a number whose thousands a comma between cells has parted."""
 _NO_LONGER = frozenset({"decimated", "downsampled", "resampled", "interpolated", "e"})
 """Words of what the samples' rate is no longer, or of an example (`e.g.`)."""
+MAX_CELLS, MAX_CELL = 8, 300
+"""Of a row this much is looked at."""
 _COMMENT = "#%;/*! "
 """What lines of comment begin with."""
 _ABOUT_AXES = frozenset(
@@ -44,7 +46,7 @@ _EITHER = frozenset({"or", "anatomical", "not", "no"})
 _STEPS = frozenset({"period", "deltax", "xdelta", "deltat", "xincrement", "wfincrement"})
 """What programs call the time between two samples."""
 _IN_WORDS = re.compile(
-    r"(?P<number>[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)\s*"
+    r"(?<![0-9.,])(?P<number>[0-9][0-9.,]*+(?:[eE][+-]?[0-9]+)?)\s*"
     r"(?:(?P<hertz>k?hz)|(?P<samples>k?sa?/s|k?sps|samples?\s*(?:/|per)\s*s(?:ec(?:onds?)?)?)|(?P<period>[mµu]?s(?:ec)?))\b",
     re.IGNORECASE,
 )
@@ -144,7 +146,7 @@ def are_sae(text: str) -> bool:
 def facts_stated(rows: Rows) -> Iterator[tuple[str, list[str]]]:
     """Rows as a name and what is said for it."""
     for row in rows:
-        name, *cells = [cell.strip() for cell in row] or [""]
+        name, *cells = [cell[:MAX_CELL].strip() for cell in row[:MAX_CELLS]] or [""]
         if with_value := _WITH_VALUE.fullmatch(name):
             name, cells = with_value[1].strip(), [with_value[2].strip(), *cells]
         yield name.lstrip(_COMMENT).rstrip(":= "), cells

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from headimpact_service.ingest.cells import LineCells, Stacked, Words
+from headimpact_service.ingest.blocks import lie_in_long_blocks
+from headimpact_service.ingest.cells import LineCells, Stacked, Words, is_written_number
+from headimpact_service.ingest.csv_format import CsvTable
+from headimpact_service.ingest.lines_above import rates_stated
 
 cells = st.lists(st.sampled_from(["", "a", "b", "Ω"]), max_size=12)
 
@@ -50,3 +54,19 @@ def test_a_row_that_is_not_there_is_an_error():
     for form in forms(["a"])[:3]:
         with pytest.raises(IndexError):
             form[1]
+
+
+@pytest.mark.parametrize("long", ["1" * 200_000, "0." + "0" * 200_000, "1." + "1" * 200_000])
+def test_a_cell_of_many_digits_is_told_in_one_pass(long: str) -> None:
+    """In as many passes as it has digits, it would take hours."""
+    assert is_written_number(long)
+    for other in (f"{long}x", f"{long} Hz"):
+        assert not is_written_number(other)
+        assert not lie_in_long_blocks([other, other])
+        assert np.isinf(csv_number(other))
+        assert list(rates_stated([[f"Note {other}"]], sentences=True)) == []
+
+
+def csv_number(cell: str) -> float:
+    [values] = [block.numbers[0] for block in CsvTable(io.BytesIO(f"a,b\n{cell},2\n".encode())).blocks([0], [])]
+    return float(values[0])

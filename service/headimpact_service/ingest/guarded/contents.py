@@ -12,7 +12,7 @@ from headimpact_service.ingest.table import Table
 MAX_COLUMNS = 1024
 MAX_HEADING = 200
 MAX_TEXT = 1000
-MAX_STATED = 8
+MAX_STATED, MAX_SAID = 8, 300
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ def checked_headings(headings: Iterable[str]) -> tuple[str, ...]:
 
 def stated(cells: Iterable[str]) -> list[str]:
     """The first cells of a row above the headings, or of what else is said of a table, cut to a bound."""
-    return [cell[:MAX_HEADING] for cell in islice(cells, MAX_STATED)]
+    return [cell[:MAX_SAID] for cell in islice(cells, MAX_STATED)]
 
 
 def checked_text(text: str) -> str:
