@@ -212,8 +212,11 @@ class CsvTable:
             for row in islice(reader, count):
                 rows.append(row)
                 self._ends.append(self._line + reader.line_num)
-        except csv.Error:
-            raise unreadable(f"The quotes around line {self._line + reader.line_num} do not match.") from None
+        except csv.Error as error:
+            line = self._line + reader.line_num
+            if "field limit" in str(error):
+                raise unreadable(f"Line {line} has a cell of more than {csv.field_size_limit()} characters.") from None
+            raise unreadable(f"The quotes around line {line} do not match.") from None
         return rows
 
     def _fitted(self, row: list[str], place: int, numbers: Sequence[int]) -> Iterator[list[str]]:
