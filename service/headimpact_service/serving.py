@@ -16,6 +16,10 @@ from headimpact_service.errors import Problem
 from headimpact_service.middleware import new_request_id
 from headimpact_service.settings import Settings
 
+MAX_HEAD = 64 * 1024
+"""Bytes of a request's target and header fields."""
+MAX_UNPARSED = 1024 * 1024
+"""Bytes in which a head must end: what is read at once may hold the end of another body, too."""
 SHUTDOWN_S = 20
 """Requests under way may take this long to end once the process is told to stop."""
 
@@ -32,6 +36,10 @@ class GuardedProtocol(HttpToolsProtocol):
     guard: asyncio.TimerHandle | None = None
     head_is_open = False
     """A head has begun, and is not there as a whole."""
+    head_bytes = 0
+    """Of the target and the header fields that are there as a whole, trailers among them."""
+    unparsed_bytes = 0
+    """Received while a head was open: with its last field, of which nothing is told before its end."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override] # as uvicorn has it
         """A new connection owes a head."""
@@ -46,13 +54,35 @@ class GuardedProtocol(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         """A head of which only a part has come: the rest is owed, also on a connection that is kept."""
         super().data_received(data)
-        if self.head_is_open and self.guard is None:
+        if not self.head_is_open:
+            return
+        self.unparsed_bytes += len(data)
+        if self.unparsed_bytes > MAX_UNPARSED and not self.transport.is_closing():
+            self.send_400_response("")
+        elif self.guard is None:
             self._expect_within(self.head_timeout_s)
 
     def on_message_begin(self) -> None:
         """The first byte of a request."""
         super().on_message_begin()
         self.head_is_open = True
+        self.head_bytes = self.unparsed_bytes = 0
+
+    def on_url(self, url: bytes) -> None:
+        """The target, or a part of it."""
+        self._count(len(url))
+        super().on_url(url)
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """A field of the head, or of the trailer behind a body in chunks."""
+        self._count(len(name) + len(value) + len(": \r\n"))
+        super().on_header(name, value)
+
+    def _count(self, size: int) -> None:
+        """Refuse a head that is too long: the parser makes a 400 of it."""
+        self.head_bytes += size
+        if self.head_bytes > MAX_HEAD:
+            raise ValueError
 
     def on_headers_complete(self) -> None:
         """The head is there."""

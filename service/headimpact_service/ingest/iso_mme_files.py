@@ -38,7 +38,7 @@ class Header:
         return float(value) if value is not None and re.fullmatch(NUMBER, value, re.ASCII) else None
 
 
-NUMBER = r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?"
+NUMBER = r"[+-]?([0-9]++(\.[0-9]*+)?|\.[0-9]++)([eE][+-]?[0-9]{1,3})?"
 
 
 def decoded(data: bytes) -> str:

@@ -48,12 +48,21 @@ def prepare(url: URL) -> None:
     del url
 
 
+UNREACHABLE_S = 10
+"""So long a host that no longer answers the network holds a connection."""
+
+
 def options(access: Access, busy_timeout_s: float) -> dict[str, Any]:
     """What an engine is made with: a connection that the server dropped is noticed before it is used to read."""
-    return {
-        "pool_pre_ping": access is Access.READ,
-        "connect_args": {"application_name": "headimpact", "connect_timeout": max(2, round(busy_timeout_s))},
+    arguments = {
+        "application_name": "headimpact",
+        "connect_timeout": max(2, round(busy_timeout_s)),
+        "tcp_user_timeout": UNREACHABLE_S * 1000,
+        "keepalives_idle": UNREACHABLE_S // 2,
+        "keepalives_interval": 2,
+        "keepalives_count": 3,
     }
+    return {"pool_pre_ping": access is Access.READ, "connect_args": arguments}
 
 
 def set_up(engine: Engine, access: Access, busy_timeout_s: float) -> None:

@@ -14,6 +14,7 @@ from headimpact_service.errors import Problem
 from headimpact_service.ingest.blocks import lie_in_long_blocks
 from headimpact_service.ingest.cells import LineCells, Stacked, Words, is_written_number
 from headimpact_service.ingest.csv_format import CsvTable
+from headimpact_service.ingest.dts_header import A_NUMBER
 from headimpact_service.ingest.lines_above import rates_stated
 
 cells = st.lists(st.sampled_from(["", "a", "b", "Ω"]), max_size=12)
@@ -65,6 +66,7 @@ def test_a_cell_of_many_digits_is_told_in_one_pass(long: str) -> None:
         assert not is_written_number(other)
         assert not lie_in_long_blocks([other, other])
         assert np.isinf(csv_number(other))
+        assert not A_NUMBER.fullmatch(other)
         assert list(rates_stated([[f"Note {other}"]], sentences=True)) == []
 
 

@@ -101,6 +101,37 @@ class TestStalledClients:
         assert answer.startswith(b"HTTP/1.1 400 ")
         assert b"application/problem+json" in answer
 
+    @pytest.mark.parametrize(
+        ("head", "status"),
+        [
+            (b"X: " + b"a" * 60_000, b"200"),
+            (b"X: " + b"a" * 70_000, b"400"),
+            (b"\r\n".join([b"X: a"] * 9_000), b"200"),
+            (b"\r\n".join([b"X: a"] * 20_000), b"400"),
+        ],
+    )
+    def test_a_head_has_64_kib_at_most(self, impatient: Service, head: bytes, status: bytes) -> None:
+        with socket.create_connection(("127.0.0.1", impatient.port), timeout=10) as connection:
+            connection.sendall(b"GET /livez HTTP/1.1\r\nHost: x\r\n" + head + b"\r\nConnection: close\r\n\r\n")
+            answer = received(connection)
+        assert answer.startswith(b"HTTP/1.1 " + status + b" ")
+
+    @pytest.mark.parametrize(
+        "sent",
+        [
+            b"GET /livez HTTP/1.1\r\nX: " + b"a" * 30_000_000,
+            b"GET /livez HTTP/1.1\r\n" + b"X: a\r\n" * 5_000_000,
+            b"POST /v1/score HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n" + b"X: a\r\n" * 5_000_000,
+        ],
+        ids=["one field", "many", "behind a body"],
+    )
+    def test_a_longer_one_is_not_read_to_its_end(self, impatient: Service, sent: bytes) -> None:
+        address = ("127.0.0.1", impatient.port)
+        with socket.create_connection(address, timeout=10) as connection, pytest.raises(ConnectionError):
+            connection.sendall(sent)
+        with impatient.client(impatient.key) as client:
+            assert client.get("/livez").status_code == 200
+
     def test_a_body_that_is_too_large_is_answered_although_it_is_still_being_sent(self, impatient: Service) -> None:
         with impatient.client(impatient.key) as client:
             headers = {"Content-Type": "application/json"}
