@@ -273,8 +273,13 @@ class TestAxes:
 
     WORDS = ("SAE J211", "sae_j211", "J211-1", "SAE", "SAE J211/1", "SAE J1733", "ISO 6487 / SAE J211")
 
-    @pytest.mark.parametrize("name", ["Axes", "Frame", "Achsen", "Vorzeichen", "Sign convention"])
-    @pytest.mark.parametrize("said", [*WORDS, "x forward, y right, z down", "z: down", "y to the right"])
+    @pytest.mark.parametrize(
+        ("name", "said"),
+        [
+            *(("Axes", said) for said in (*WORDS, "x forward, y right, z down", "z: down", "y to the right")),
+            *((name, "J211") for name in ("Frame", "Achsen", "Vorzeichen", "Sign convention")),
+        ],
+    )
     def test_by_a_row_above_the_headings(self, name: str, said: str) -> None:
         text = (
             f'{name}: "{said}"\n{csv_text()}'.replace('"', "") if "," not in said else f"{name}: {said}\n{csv_text()}"
@@ -296,8 +301,13 @@ class TestAxes:
     def test_by_their_directions(self, rows: str) -> None:
         assert codes(refused(f"{rows}\n{csv_text()}")) == [("axes", "axes-unclear")]
 
-    @pytest.mark.parametrize("heading", ["frame", "coordinate_system", "Convention", "axis_system"])
-    @pytest.mark.parametrize("said", WORDS)
+    @pytest.mark.parametrize(
+        ("heading", "said"),
+        [
+            *(("frame", said) for said in WORDS),
+            *((heading, "J211") for heading in ("coordinate_system", "Convention", "axis_system")),
+        ],
+    )
     def test_by_a_column(self, heading: str, said: str) -> None:
         text = csv_text(before={heading: said})
         assert codes(refused(text)) == [("axes", "axes-unclear")]
