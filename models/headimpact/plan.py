@@ -126,13 +126,13 @@ def plan_of(layout: Layout) -> Plan:
 def _units_plan(layout: Layout, tracks: dict[SignalName, Track]) -> Plan | None:
     """The plan with the paper's filter for each signal that has none; None where all have one, or nothing compares."""
     chosen, recorded = layout.low_pass, {signal.name for signal in layout.signals}
+    bare = chosen.linear_acceleration is None or (chosen.angular_velocity is None and "angular_velocity" in recorded)
+    if not bare or not {"linear_acceleration", "angular_acceleration"} <= set(tracks):
+        return None
     filtered = LowPass(
         PAPER.linear_acceleration if chosen.linear_acceleration is None else chosen.linear_acceleration,
         PAPER.angular_velocity if chosen.angular_velocity is None else chosen.angular_velocity,
     )
-    bare = chosen.linear_acceleration is None or (chosen.angular_velocity is None and "angular_velocity" in recorded)
-    if not bare or not {"linear_acceleration", "angular_acceleration"} <= set(tracks):
-        return None
     return plan_of(replace(layout, low_pass=filtered))
 
 

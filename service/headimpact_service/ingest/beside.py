@@ -86,8 +86,7 @@ def with_unread(layout: Layout, headings: Headings, table: Table, group_by: Sequ
         return replace(layout, unread=Unread(names=named, said_one=True))
     if layout.sample_number is not None:
         return layout
-    clocks = {other.column for other in layout.others.clocks} - {*table.wordless}  # looked at as text, too
-    passed = {*layout.numbers, *layout.texts, *table.wordless} - clocks
+    passed = _read_or_wordless(layout, table)
     timed = layout.is_timed
     unread = unread_columns(layout.headings, passed, timed=timed, keyed=bool(layout.keys), named=bool(group_by))
     return replace(layout, unread=unread if timed else replace(unread, peaks=(*layout.peaks, *layout.axis_peaks)))

@@ -73,7 +73,7 @@ def tell_parts_or_name_them(cells: Sequence[str]) -> bool:
     """The same, also of words that each name many rows, in all of them or, as merged cells are saved, in the first."""
     if tell_parts(cells):
         return True
-    filled = list(accumulate(map(said, cells), _carried))
+    filled = _filled(cells)
     if filled[:1] == [""]:
         return False
     named = _lengths(filled, STAY)
@@ -95,7 +95,12 @@ def mark_blocks(cells: Sequence[str]) -> bool:
 
 def peaks_lie_in_blocks(cells: Sequence[str]) -> bool:
     """Whether a column of peaks has several that stay, in all rows of theirs or in the first: one an impact."""
-    return len(_lengths(list(accumulate(map(said, cells), _carried)), STAY)) > 1
+    return len(_lengths(_filled(cells), STAY)) > 1
+
+
+def _filled(cells: Sequence[str]) -> list[str]:
+    """What each row says or, where it says nothing, the last one above that does."""
+    return list(accumulate(map(said, cells), _carried))
 
 
 def _carried(above: str, cell: str) -> str:

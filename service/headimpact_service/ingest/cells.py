@@ -21,6 +21,9 @@ Not `none`: that is a filter.
 """
 _WRITTEN_NUMBER = re.compile(r"[+-]?([0-9]++([.,][0-9]*+)?|[.,][0-9]++)([eE][+-]?[0-9]+)?", re.ASCII)
 
+NUMBER = re.compile(r"\s*[+-]?([0-9]++(\.[0-9]*+)?|\.[0-9]++)([eE][+-]?[0-9]+)?\s*", re.ASCII)
+"""With a decimal point. float() also takes 1_000, digits of other scripts, and nan; samples hold none of them."""
+
 
 def said(cell: str) -> str:
     """A cell without the blanks around it; empty where it holds nothing."""

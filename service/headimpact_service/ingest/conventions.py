@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from headimpact.quality import words
 from headimpact.recording import SignalName
+from headimpact_service.errors import Problem
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.headings import Headings
 from headimpact_service.ingest.lines_above import are_sae, speaks_of_axes
@@ -50,12 +51,17 @@ def _speaks_of_units(headings: Headings, column: int, read: Collection[int]) -> 
 def require_axes(column: str, text: str) -> None:
     """Refuse to take the axes for anatomical where a column says that they are SAE's."""
     if are_sae(text):
-        raise file_fault(
-            f"{column} says {text} of the axes, which is not read: give axes beside the file (sae_j211, or anatomical "
-            "if the samples are).",
-            "axes-unclear",
-            parameter="axes",
-        )
+        raise unclear_axes(column, text)
+
+
+def unclear_axes(whose: str, said: str) -> Problem:
+    """The 422 for axes that something beside the samples says to be SAE's."""
+    return file_fault(
+        f"{whose} says {said} of the axes, which is not read: give axes beside the file (sae_j211, or anatomical if "
+        "the samples are).",
+        "axes-unclear",
+        parameter="axes",
+    )
 
 
 def require_units(column: str, text: str, units: Mapping[SignalName, str]) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.blank_lines import BlankLines
-from headimpact_service.ingest.cells import LineCells, is_no_number
+from headimpact_service.ingest.cells import NUMBER, LineCells, is_no_number
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns
 from headimpact_service.ingest.decimal_commas import (
     GROUPED,
@@ -32,7 +32,7 @@ from headimpact_service.ingest.decimal_commas import (
     has_decimal_comma,
     may_group_by_point,
 )
-from headimpact_service.ingest.heading_rows import LOOK, cells_of, joined, top_of
+from headimpact_service.ingest.heading_rows import LOOK, cells_of, joined, stated, top_of
 from headimpact_service.ingest.options import ImportOptions
 from headimpact_service.ingest.presets import preset_named
 from headimpact_service.ingest.record import ImpactRecord
@@ -48,8 +48,6 @@ MAX_COLUMNS = 1024
 ROWS_AT_ONCE = 4096
 _SEPARATOR = re.compile(r"sep=.\s*", re.IGNORECASE)
 Block = tuple[FloatArray, Sequence[Sequence[str]]]
-# float() also takes 1_000, digits of other scripts, and nan; a file of samples holds none of them.
-_NUMBER = re.compile(r"\s*[+-]?([0-9]++(\.[0-9]*+)?|\.[0-9]++)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
 
 def read_csv(source: Source, options: ImportOptions) -> Iterator[ImpactRecord | Problem]:
@@ -91,8 +89,9 @@ class CsvTable:
         self._decimal_points = text.has_decimal_points(self._delimiter)
         reader = csv.reader(chain([heading], self._lines), delimiter=self._delimiter, strict=True)
         headings = self._rows(reader, 1)[0]
-        self.above = [cells_of(line, self._delimiter) for line in (*self._passed, *above)]
-        self.headings: tuple[str, ...] = tuple(joined(self.above[-1] if above else [], headings))
+        rows = [cells_of(line, self._delimiter) for line in (*self._passed, *above)]
+        self.above = [stated(row) for row in rows]
+        self.headings: tuple[str, ...] = tuple(joined(rows[-1] if above else [], headings))
         self._repeated = [heading.strip() for heading in headings]
         self.units: Mapping[int, str] = self._read_units(reader) if has_units else {}
         self._simply_quoted = _simply_quoted(self._delimiter)
@@ -256,7 +255,7 @@ class CsvTable:
 
     def _number(self, cell: str) -> float:
         """The number in a cell; NaN where there is none, infinite where something else stands."""
-        comma = _NUMBER.fullmatch(cell) is None
+        comma = NUMBER.fullmatch(cell) is None
         if comma and not has_comma(cell):
             if groups_thousands(cell):
                 raise unreadable(GROUPED)
@@ -290,7 +289,7 @@ class CsvTable:
 
 def _is_word(cell: str) -> bool:
     """Whether a cell holds something, and no number however that is written."""
-    return not (is_no_number(cell) or _NUMBER.fullmatch(cell) or has_comma(cell))
+    return not (is_no_number(cell) or NUMBER.fullmatch(cell) or has_comma(cell))
 
 
 def _lines(stream: BinaryIO, encoding: str) -> Iterator[str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, islice
 
 from headimpact.recording import AXES, SIGNALS
 from headimpact_service.ingest.cells import is_written_number
@@ -17,6 +17,8 @@ from headimpact_service.ingest.text_facts import DELIMITERS
 LOOK = 60
 """Lines among which a table begins."""
 MAX_UNIT = 16
+MAX_CELLS, MAX_CELL = 8, 300
+"""Of a row above the headings this much is looked at."""
 _AXIS = re.compile(r"[\s_-]*axis", re.IGNORECASE)
 
 
@@ -26,6 +28,11 @@ class Top:
 
     heading: int
     has_units: bool
+
+
+def stated(cells: Iterable[str]) -> list[str]:
+    """The first cells of a row above the headings, or of what else is said of a table, cut to a bound."""
+    return [cell[:MAX_CELL] for cell in islice(cells, MAX_CELLS)]
 
 
 def are_units(headings: Sequence[str], cells: Sequence[str]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from headimpact_service.ingest.spelling import MAX_COMPACT, compact, unit_at_end
 from headimpact_service.ingest.table import DURATION
 from headimpact_service.ingest.time_headings import may_be_times, sensor_of_times, unit_of_times
 
+_NUMBERED = re.compile(r"column ([0-9]{1,5})", re.ASCII | re.IGNORECASE)
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 
@@ -74,8 +76,8 @@ class Headings:
 
     def _numbered(self, name: str) -> int | None:
         """The column that `Column 1` names, if it has no heading."""
-        number = name.strip().lower().removeprefix("column ")
-        place = int(number) - 1 if number.isdecimal() and len(number) < 6 and number != name.strip() else -1
+        found = _NUMBERED.fullmatch(name.strip())
+        place = -1 if found is None else int(found[1]) - 1
         return place if 0 <= place < len(self.written) and not self.written[place] else None
 
     def nearest(self, spelling: str, column: int) -> int | None:

@@ -52,10 +52,11 @@ class ImpactTimes:
         stamps = self._stamps(clock.column, rows)
         if rate is not None and (signal.clock is not None or not signal.is_apart):
             stamps_ms = stamps * clock.milliseconds
-            placed = with_gaps(stamps_ms, rate) if fill_gaps and not follows(stamps_ms, rate) else None
-            if placed is not None:
+            if not follows(_there(stamps_ms), rate):
+                placed = with_gaps(stamps_ms, rate) if fill_gaps else None
+                if placed is None:
+                    raise _off_time(rate)
                 return Track(name, rows, None, placed, 1.0, clock.dated)
-            _require_on_time(stamps_ms, rate)
         return Track(name, rows, rate, stamps, clock.milliseconds, clock.dated)
 
     def _said_rate(self, name: SignalName, signal: SignalLayout, reading: Reading) -> float | None:
@@ -324,12 +325,11 @@ def _require_one_rate(said: Iterable[float | None]) -> None:
         )
 
 
-def _require_on_time(stamps_ms: FloatArray, rate: float) -> None:
-    """Refuse times that are not those of a rate."""
-    if not follows(_there(stamps_ms), rate):
-        raise file_fault(
-            f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew or "
-            "are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a mapping).",
-            "rate-differs",
-            parameter="sample_rate_hz",
-        )
+def _off_time(rate: float) -> Problem:
+    """The 422 for times that are not those of a rate."""
+    return file_fault(
+        f"The impact's times do not go on at {rate:g} samples per second: they leave out samples, begin anew or "
+        "are of another rate. Leave out the rate or, if the times are wrong, the times (time: null in a mapping).",
+        "rate-differs",
+        parameter="sample_rate_hz",
+    )

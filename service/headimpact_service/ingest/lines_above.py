@@ -19,14 +19,12 @@ _NUMBER = re.compile(r"([+-]?[0-9.,]++(?:[eE][+-]?[0-9]+)?)\s*([A-Za-zµ/]*)")
 _UNIT = re.compile(r"[(\[]?([A-Za-zµ/]{1,20})[)\]]?")
 """A unit in a cell of its own."""
 _THOUSANDS = re.compile(r"[1-9][0-9]{0,2}[.,][0-9]{3}")
-_PARTS = re.compile("[.,]")
 """Of samples per second, of which nobody has so few to three digits."""
+_PARTS = re.compile("[.,]")
 _FEW, _THREE = re.compile("[1-9][0-9]{0,2}"), re.compile("[0-9]{3}([^0-9]|$)")
 """The parts of a number whose thousands a comma between cells has parted."""
 _NO_LONGER = frozenset({"decimated", "downsampled", "resampled", "interpolated", "e"})
 """Words of what the samples' rate is no longer, or of an example (`e.g.`)."""
-MAX_CELLS, MAX_CELL = 8, 300
-"""Of a row this much is looked at."""
 _COMMENT = "#%;/*! "
 """What lines of comment begin with."""
 _ABOUT_AXES = frozenset(
@@ -146,7 +144,7 @@ def are_sae(text: str) -> bool:
 def facts_stated(rows: Rows) -> Iterator[tuple[str, list[str]]]:
     """Rows as a name and what is said for it."""
     for row in rows:
-        name, *cells = [cell[:MAX_CELL].strip() for cell in row[:MAX_CELLS]] or [""]
+        name, *cells = [cell.strip() for cell in row] or [""]
         if with_value := _WITH_VALUE.fullmatch(name):
             name, cells = with_value[1].strip(), [with_value[2].strip(), *cells]
         yield name.lstrip(_COMMENT).rstrip(":= "), cells

@@ -112,10 +112,11 @@ def unnamed(layout: Layout, headings: Headings, table: Table) -> list[QualityNot
         return []
     found: dict[tuple[str, ...], dict[str, str]] = {}
     for column, heading in enumerate(headings.written):
-        axes = [(_AXIS.sub("*", word), axis[1]) for word in words_of(heading) if (axis := _AXIS.search(word))]
+        listed = words_of(heading)
+        axes = [axis[1] for word in listed if (axis := _AXIS.search(word))]
         if len(axes) == 1 and column not in layout.numbers and table.has_samples(column):
-            alike = tuple(_AXIS.sub("*", word) for word in words_of(heading))
-            found.setdefault(alike, {}).setdefault(axes[0][1], heading)
+            alike = tuple(_AXIS.sub("*", word) for word in listed)
+            found.setdefault(alike, {}).setdefault(axes[0], heading)
     return [_unnamed(list(by_axis.values())) for by_axis in found.values() if len(by_axis) == len(AXES)]
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from headimpact.published import QUALITY_LIMITS
 from headimpact.stamps import rate_said, rounding_s
+from headimpact_service.ingest.filling import MOST
 
 FloatArray = NDArray[np.float64]
 
@@ -17,7 +18,6 @@ ROUNDED_TO_MS = (1.0, 0.1, 0.01)
 """What stamps are written to."""
 NEAR, DRIFT = 0.6, 0.005
 """How far a stamp may be from where a stated rate has its sample: in samples, and by what went by since the first."""
-MOST_MISSING: int = QUALITY_LIMITS["gaps"]["maximum_samples"]
 SURE = 4.0
 """Standard errors of a rate that stamps say."""
 SAME_RATE: float = QUALITY_LIMITS["record"]["same_rate"]
@@ -76,7 +76,7 @@ def with_gaps(stamps_ms: FloatArray, rate_hz: float) -> FloatArray | None:
     step = 1000.0 / rate_hz
     places = np.rint((stamps_ms - stamps_ms[0]) / step)
     steps = np.diff(places)
-    if not ((steps >= 1.0) & (steps <= 1.0 + MOST_MISSING)).all():
+    if not ((steps >= 1.0) & (steps <= 1.0 + MOST)).all():
         return None
     filled = np.interp(np.arange(places[-1] + 1.0), places, stamps_ms)
     return stamps_ms[0] + places * step if follows(filled, rate_hz) else None

@@ -16,6 +16,7 @@ from headimpact_service.ingest.beside import (
     with_supplied,
     with_unread,
 )
+from headimpact_service.ingest.conventions import unclear_axes
 from headimpact_service.ingest.facts_beside import facts_above
 from headimpact_service.ingest.file_faults import file_fault
 from headimpact_service.ingest.file_names import named_facts
@@ -248,12 +249,7 @@ def _require_no_other_axes(layout: Layout, plan: Plan, table: Table) -> None:
     """Refuse to take the axes for anatomical where a row above the headings says that they are SAE's."""
     if _says_axes(layout, plan) or (stated := axes_stated([*table.above, *table.beside])) is None:
         return
-    raise file_fault(
-        f"A row above the headings says {stated} of the axes, which is not read: give axes beside the file (sae_j211, "
-        "or anatomical if the samples are).",
-        "axes-unclear",
-        parameter="axes",
-    )
+    raise unclear_axes("A row above the headings", stated)
 
 
 def _require_rate(layout: Layout, plan: Plan) -> None:

@@ -271,12 +271,13 @@ def _update(conn: Connection, athlete: Athlete) -> Athlete:
 
 def require(conn: Connection, data_set_id: bytes, athlete_id: bytes) -> Athlete:
     """An athlete who was not erased, or a `not-found` problem, which says into whom one was merged."""
-    found = present(conn, data_set_id, athlete_id)
-    if found is None:
+    found = get(conn, data_set_id, athlete_id)
+    if found is not None:
+        return found
+    merged = present(conn, data_set_id, athlete_id)
+    if merged is None:
         raise not_found("athlete")
-    if found.id != athlete_id:
-        raise Problem("not-found", f"This athlete was merged into {ids.encode('ath', found.id)}.")
-    return found
+    raise Problem("not-found", f"This athlete was merged into {ids.encode('ath', merged.id)}.")
 
 
 def _require_free(conn: Connection, data_set_id: bytes, external_id: str | None, of: bytes | None = None) -> None:

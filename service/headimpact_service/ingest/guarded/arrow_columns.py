@@ -14,9 +14,17 @@ import pyarrow.compute as pc
 
 from headimpact_service.ingest.cells import Words, number_text
 from headimpact_service.ingest.dated import DAY_S, FIRST_ROWS, NIGHT_S, Elapsed, are_dated
-from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, stated, unreadable
-from headimpact_service.ingest.guarded.nested_columns import Batches, is_list, laid_out
-from headimpact_service.ingest.heading_rows import LOOK
+from headimpact_service.ingest.guarded.arrow_types import (
+    is_instant,
+    is_list,
+    is_list_of_numbers,
+    is_number,
+    is_text,
+    is_told,
+)
+from headimpact_service.ingest.guarded.contents import checked_headings, checked_text, unreadable
+from headimpact_service.ingest.guarded.nested_columns import Batches, laid_out
+from headimpact_service.ingest.heading_rows import LOOK, stated
 from headimpact_service.ingest.table import DURATION, Columns, FloatArray
 
 MICROSECONDS = "us"
@@ -30,24 +38,6 @@ ATTRIBUTES = b"PANDAS_ATTRS"
 MAX_ATTRIBUTES = 64 * 1024
 _NO_TEXT = "A column that is to be read as text holds something else."
 _EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
-
-
-def is_number(kind: pa.DataType) -> bool:
-    """Whether cells of this type are numbers."""
-    types = pa.types
-    return bool(
-        types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_null(kind)
-    )  # a column without any value is of no type
-
-
-def is_list_of_numbers(kind: pa.DataType) -> bool:
-    """Whether cells of this type are lists of samples."""
-    return is_list(kind) and is_number(kind.value_type)
-
-
-def _is_instant(kind: pa.DataType) -> bool:
-    """Whether cells of this type are times of a day, with its date or without."""
-    return bool(pa.types.is_timestamp(kind) or pa.types.is_time(kind))
 
 
 class ArrowTable:
@@ -67,8 +57,10 @@ class ArrowTable:
         self.dated: frozenset[int] = frozenset()
         self._elapsed = Elapsed()
         self.wordless = [place for place, kind in enumerate(self._types) if not is_told(kind)]
-        self.units |= dict.fromkeys(self._samples(pa.types.is_duration), DURATION)
-        self.dated = frozenset({*self._samples(_is_instant), *self._written_times()})
+        durations = self._samples(pa.types.is_duration)
+        self.units |= dict.fromkeys(durations, DURATION)
+        self.dated = frozenset({*self._samples(is_instant), *self._written_times()})
+        self._timed = self.dated.union(durations)
 
     def _samples(self, is_kind: Callable[[pa.DataType], bool]) -> list[int]:
         """The columns whose samples are of such a type; where rows are impacts, samples stand in lists."""
@@ -102,7 +94,7 @@ class ArrowTable:
 
     def _numbers(self, column: pa.Array) -> FloatArray:
         if not is_text(column.type):
-            return unwrapped(floats(column)) if pa.types.is_time(column.type) else floats(column)
+            return floats(column)
         return np.array([self._elapsed.microseconds(cell or "") for cell in column.to_pylist()])
 
     def _require_numbers(self, place: int) -> None:
@@ -111,15 +103,7 @@ class ArrowTable:
 
     def _holds_numbers(self, place: int) -> bool:
         kind = self._types[place]
-        if is_number(kind) or is_list_of_numbers(kind) or place in self.dated:
-            return True
-        return place in self._samples(pa.types.is_duration)
-
-
-def is_text(kind: pa.DataType) -> bool:
-    """Whether cells of this type are text."""
-    plain = kind.value_type if pa.types.is_dictionary(kind) else kind
-    return bool(pa.types.is_string(plain) or pa.types.is_large_string(plain))
+        return is_number(kind) or is_list_of_numbers(kind) or place in self._timed
 
 
 def _is_dated(column: pa.Array) -> bool:
@@ -130,22 +114,14 @@ def _is_dated(column: pa.Array) -> bool:
         return False
 
 
-def is_told(kind: pa.DataType) -> bool:
-    """Whether cells of this type can be read as text."""
-    types = pa.types
-    kind = kind.value_type if types.is_dictionary(kind) else kind
-    told = (types.is_null, types.is_string, types.is_large_string, types.is_integer, types.is_floating)
-    return any(is_one(kind) for is_one in (*told, types.is_timestamp, types.is_time, types.is_boolean, types.is_date))
-
-
 def floats(column: pa.Array) -> FloatArray:
     """A column of numbers, of times in microseconds; NaN where a cell is empty."""
-    column = _in_microseconds(column)
-    cast = column.cast(pa.float64(), safe=False)
-    return np.ascontiguousarray(cast.to_numpy(zero_copy_only=False), dtype=np.float64)
+    cast = _in_microseconds(column).cast(pa.float64(), safe=False)
+    found = np.ascontiguousarray(cast.to_numpy(zero_copy_only=False), dtype=np.float64)
+    return _unwrapped(found) if pa.types.is_time(column.type) else found
 
 
-def unwrapped(microseconds: FloatArray) -> FloatArray:
+def _unwrapped(microseconds: FloatArray) -> FloatArray:
     """Times of day that go on behind midnight, as :class:`Elapsed` has them of text."""
     steps = np.diff(microseconds, prepend=microseconds[:1])
     days = np.cumsum((steps < -NIGHT_S * 1e6).astype(np.float64) - (steps > NIGHT_S * 1e6))
@@ -236,8 +212,7 @@ class _Lists:
     def __init__(self, column: pa.Array) -> None:
         self.lengths = pc.fill_null(pc.list_value_length(column), 0).to_numpy(zero_copy_only=False).astype(np.int64)
         self.starts = np.cumsum(self.lengths) - self.lengths
-        values = column.flatten()
-        self._values = unwrapped(floats(values)) if pa.types.is_time(values.type) else floats(values)
+        self._values = floats(column.flatten())
 
     def laid_out(self, first: int, rooms: np.ndarray[Any, np.dtype[np.int64]]) -> FloatArray:
         """The lists from the `first` on, each in the room it is given, NaN where it is shorter."""

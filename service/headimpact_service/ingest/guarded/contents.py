@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import islice
 
 from headimpact_service.errors import Problem
 from headimpact_service.ingest.table import Table
@@ -12,7 +11,6 @@ from headimpact_service.ingest.table import Table
 MAX_COLUMNS = 1024
 MAX_HEADING = 200
 MAX_TEXT = 1000
-MAX_STATED, MAX_SAID = 8, 300
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +37,6 @@ def checked_headings(headings: Iterable[str]) -> tuple[str, ...]:
     if len(kept) > MAX_COLUMNS:
         raise unreadable(f"A file may have at most {MAX_COLUMNS} columns.")
     return tuple(heading[:MAX_HEADING] for heading in kept)
-
-
-def stated(cells: Iterable[str]) -> list[str]:
-    """The first cells of a row above the headings, or of what else is said of a table, cut to a bound."""
-    return [cell[:MAX_SAID] for cell in islice(cells, MAX_STATED)]
 
 
 def checked_text(text: str) -> str:

@@ -7,14 +7,15 @@ have three numbers, or six, are the vectors of samples and no impacts of so few.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from headimpact_service.ingest.guarded.array_table import AXES
+from headimpact_service.ingest.guarded.arrow_types import is_list, is_list_of_numbers
 from headimpact_service.ingest.guarded.contents import MAX_COLUMNS, unreadable
 
 Batches = Callable[[list[int]], Iterator[pa.RecordBatch]]
@@ -48,8 +49,6 @@ class _Leaf:
     field: pa.Field
     column: int
     steps: tuple[_Step, ...] = ()
-    taken: frozenset[str] = frozenset()
-    """Names that other columns of the file have."""
 
 
 def laid_out(schema: pa.Schema, batches: Batches) -> tuple[pa.Schema, Batches]:
@@ -59,15 +58,14 @@ def laid_out(schema: pa.Schema, batches: Batches) -> tuple[pa.Schema, Batches]:
     if not nested and not widths:
         return schema, batches
     first = _first_row(batches, nested)
-    taken_names = frozenset(schema.names)
     leaves: list[_Leaf] = []
     for place, field in enumerate(schema):
-        whole = _Leaf(field, place, taken=taken_names)
+        whole = _Leaf(field, place)
         width = widths.get(place)
         parts = (
             _leaves(whole, first.get(place)) if width is None else _vector(whole, field.type.value_type, width, "part")
         )
-        for leaf in parts:
+        for leaf in _by_own_names(field.name, parts, schema.names):
             if len(leaves) > MAX_COLUMNS:  # refused with that bound by whoever takes the schema
                 break
             leaves.append(leaf)
@@ -87,7 +85,7 @@ def _vectors(schema: pa.Schema, batches: Batches) -> dict[int, int]:
 
     Lists that hold nothing yet have none, and are no columns; those of words are none of the samples'.
     """
-    places = [place for place, kind in enumerate(schema.types) if _is_list_of_numbers(kind)]
+    places = [place for place, kind in enumerate(schema.types) if is_list_of_numbers(kind) and not _is_nested(kind)]
     if not places:
         return {}
     lengths: list[set[int]] = [set() for _ in places]
@@ -96,26 +94,15 @@ def _vectors(schema: pa.Schema, batches: Batches) -> dict[int, int]:
         rows += batch.num_rows
         for found, column in zip(lengths, batch.columns, strict=True):
             found |= set(pc.list_value_length(column).drop_null().to_pylist())
+        if any(length > MAX_WIDTH for found in lengths for length in found):
+            return {}
         if rows >= FIRST_ROWS:
             break
     told = {place: found for place, found in zip(places, lengths, strict=True) if found - {0}}
-    widths = {place: min(found) for place, found in told.items() if len(found) == 1 and min(found) <= MAX_WIDTH}
+    widths = {place: min(found) for place, found in told.items() if len(found) == 1}
     if rows < FIRST_ROWS or len(widths) < len(told) or VECTORS.isdisjoint(widths.values()):
         return {}
     return dict.fromkeys(places, 0) | widths
-
-
-def _is_list_of_numbers(kind: pa.DataType) -> bool:
-    types = pa.types
-    if not is_list(kind) or _is_nested(kind):
-        return False
-    held = kind.value_type
-    return bool(types.is_integer(held) or types.is_floating(held) or types.is_null(held))
-
-
-def is_list(kind: pa.DataType) -> bool:
-    """Whether cells of this type are lists, of whatever."""
-    return bool(pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind))
 
 
 def _is_nested(kind: pa.DataType) -> bool:
@@ -178,10 +165,16 @@ def _vector(leaf: _Leaf, kind: pa.DataType, width: int, within: Within) -> Itera
 
 def _below(leaf: _Leaf, name: str, field: pa.Field, step: _Step) -> _Leaf:
     """A part of a column, with that one's metadata, its unit, where it has none of its own."""
-    is_fact = not leaf.steps and leaf.field.name.lower() in FACTS and name not in leaf.taken
-    called = name if is_fact else f"{leaf.field.name}_{name}"
-    named = pa.field(called, field.type, metadata=field.metadata or leaf.field.metadata)
-    return _Leaf(named, leaf.column, (*leaf.steps, step), leaf.taken)
+    named = pa.field(f"{leaf.field.name}_{name}", field.type, metadata=field.metadata or leaf.field.metadata)
+    return _Leaf(named, leaf.column, (*leaf.steps, step))
+
+
+def _by_own_names(column: str, leaves: Iterable[_Leaf], taken: Sequence[str]) -> Iterator[_Leaf]:
+    """The parts of a column; of one that holds facts by the names that they have in it, unless a column has one."""
+    for leaf in leaves:
+        own = leaf.field.name.removeprefix(f"{column}_")
+        is_fact = column.lower() in FACTS and own not in taken
+        yield replace(leaf, field=leaf.field.with_name(own)) if is_fact else leaf
 
 
 def _listed(field: pa.Field) -> pa.Field:

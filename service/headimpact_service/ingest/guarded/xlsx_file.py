@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import datetime as dt
 import io
-import re
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from python_calamine import CalamineSheet, CalamineWorkbook, SheetTypeEnum
 
-from headimpact_service.ingest.cells import is_no_number, number_text, said
+from headimpact_service.ingest.cells import NUMBER, is_no_number, number_text, said
 from headimpact_service.ingest.dated import FIRST_ROWS, Elapsed, dated_columns, elapsed_text
 from headimpact_service.ingest.decimal_commas import MIXED, UNCLEAR_COMMA, has_comma, has_decimal_comma
 from headimpact_service.ingest.guarded.contents import (
@@ -25,17 +24,15 @@ from headimpact_service.ingest.guarded.contents import (
     NamedTable,
     checked_headings,
     checked_text,
-    stated,
     unreadable,
 )
-from headimpact_service.ingest.heading_rows import LOOK, are_units, joined
+from headimpact_service.ingest.heading_rows import LOOK, are_units, joined, stated
 from headimpact_service.ingest.scaled_units import known_units
 from headimpact_service.ingest.table import Columns, FloatArray
 from headimpact_service.ingest.zip_guard import GuardedZip
 
 ROWS_AT_ONCE = 16_384
 MAX_SHEETS = 2000
-_NUMBER = re.compile(r"\s*[+-]?([0-9]++(\.[0-9]*+)?|\.[0-9]++)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 _LINKS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
@@ -160,7 +157,7 @@ class SheetTable:
         commas = set(filter(has_comma, texts))
         if not commas:
             return
-        if any("." in text and _NUMBER.fullmatch(text) for text in texts):
+        if any("." in text and NUMBER.fullmatch(text) for text in texts):
             raise unreadable(MIXED)
         if not any(map(has_decimal_comma, commas)):
             raise unreadable(UNCLEAR_COMMA)
@@ -262,7 +259,7 @@ def _has_number(row: Sequence[Any]) -> bool:
 
 
 def _says_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
-    return _is_number(cell) or (isinstance(cell, str) and (_NUMBER.fullmatch(cell) is not None or has_comma(cell)))
+    return _is_number(cell) or (isinstance(cell, str) and (NUMBER.fullmatch(cell) is not None or has_comma(cell)))
 
 
 def _is_number(cell: Any) -> bool:  # noqa: ANN401 - any cell
